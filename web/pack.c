@@ -247,7 +247,7 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
         return stop("the policy is another robot's");
     }
     robot_set_shells(robot, task->shells_stand);
-    MildStatus status = task_def_check_no_jump(task, "page", error);
+    MildStatus status = task_def_check_plain(task, "page", error);
     status = status == MILD_OK ? pack_model(robot, task, &file, error) : status;
     if (status == MILD_OK) {
         status = pack_belief(robot, &file, error);

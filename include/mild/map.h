@@ -30,7 +30,10 @@ MILD_API_BEGIN
                          equal shares pyramids, up or down, whose sides rise by a share of `slope` \
                          per metre, and waves, steps and rough ground of a share of `amplitude`,   \
                          which fade out over the last half metre. Seed and tile give relief and    \
-                         share, which is uniform in [0.25, 1]. */
+                         share, which is uniform in [0.25, 1]. */                                  \
+    ROW(BLOCKS, blocks) /* level squares of edge `wavelength`, one of them around the origin, each \
+                           at random at 0, half or all of a height: the lesser of amplitude and    \
+                           slope |x| of its middle; slope 0: amplitude; repeats after `size` */
 /* clang-format on */
 
 /* A row's enumerator: MILD_MAP_FLAT and so on. */
@@ -54,11 +57,12 @@ typedef enum {
 typedef struct {
     int kind;    /* MildMapKind */
     double cell; /* [m] edge of the cells of the height grid, and of the labels near a border */
-    double size; /* [m] rough, mixed: period after which the heights repeat; mixed: at least 10 */
+    double size; /* [m] rough, mixed, blocks: period of the heights; mixed: at least 10 */
     double amplitude;            /* [m] see MildMapKind */
     double wavelength;           /* [m] see MildMapKind */
-    double slope;                /* [-] slope: rise per metre along x; mixed: of pyramids */
-    uint64_t seed;               /* rough, mixed: seed of the random numbers */
+    double slope;                /* [-] slope: rise per metre along x; mixed: of pyramids; blocks:
+                                    see MildMapKind */
+    uint64_t seed;               /* rough, mixed, blocks: seed of the random numbers */
     int patches;                 /* MildPattern */
     double patch_size;           /* [m] */
     int patch_count;             /* materials that stripes and checker use in turn, 1 .. 255 */

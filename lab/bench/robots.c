@@ -21,12 +21,9 @@ static MildStatus rows_open(Rows *rows, const ExperimentDef *def, int device, Mi
     struct {
         float **at;
         int width;
-    } all[] = {{&rows->history, p->frames * p->observation},
-               {&rows->critic, p->critic_input},
-               {&rows->estimate, p->estimates},
-               {&rows->frame, p->observation},
-               {&rows->action, p->actions},
-               {&rows->reward, 1}};
+    } all[] = {{&rows->history, policy_history(p)}, {&rows->critic, p->critic_input},
+               {&rows->estimate, p->estimates},     {&rows->frame, p->observation},
+               {&rows->action, p->actions},         {&rows->reward, 1}};
     rows->device = device;
     int good = 1;
     for (size_t i = 0; good && i < sizeof all / sizeof *all; i++) {
@@ -136,7 +133,7 @@ static MildStatus write_script(Envs *envs, const Rows *rows, const ExperimentDef
     MildStatus status = envs_reset(envs, &view, NULL, error);
     for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
         status = device_copy(rows->device, walker->history, rows->history,
-                             count * (size_t)(p->frames * p->observation) * sizeof(float), error);
+                             count * (size_t)policy_history(p) * sizeof(float), error);
         if (status == MILD_OK) {
             controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
             status = device_copy(rows->device, script + (size_t)t * actions, walker->action,
@@ -152,7 +149,7 @@ static MildStatus record(Envs *envs, const ExperimentDef *def, const Rows *rows,
                          MildError *error) {
     const PolicyDef *p = &def->policy;
     const size_t count = (size_t)def->train.envs;
-    const Walker walker = {calloc(count * (size_t)(p->frames * p->observation), sizeof(float)),
+    const Walker walker = {calloc(count * (size_t)policy_history(p), sizeof(float)),
                            calloc(count * (size_t)p->actions, sizeof(float))};
     MildStatus status = walker.history && walker.action
                             ? write_script(envs, rows, def, controller, &walker, script, error)

@@ -78,7 +78,7 @@ static void begin_episode(Runner *r) {
 }
 
 Runner *runner_create(const RunnerDef *def, MildError *error) {
-    if (task_def_check_no_jump(def->task, "drive", error) != MILD_OK) {
+    if (task_def_check_plain(def->task, "drive", error) != MILD_OK) {
         return NULL;
     }
     Runner *r = calloc(1, sizeof *r);

@@ -12,6 +12,7 @@ typedef struct {
     Pool *pool;
     int rows_max;
     size_t width;         /* of a history */
+    size_t frame;         /* of one of its frames */
     float *history;       /* [rows_max][width] */
     LearnedInside inside; /* estimates; the others of a watched one, else NULL */
     float *seen;          /* memory of the others, then of the means */
@@ -28,7 +29,7 @@ static void learned_act_on(void *self, int rows, const float *history, float *ac
 
 /* The newest frame over the older ones of a history. */
 static void forget(const Learned *learned, float *history) {
-    const size_t frame = learned->width / TASK_FRAMES;
+    const size_t frame = learned->frame;
     for (int i = 0; i < TASK_FRAMES - 1; i++) {
         memcpy(history + (size_t)i * frame, history + (TASK_FRAMES - 1) * frame,
                frame * sizeof *history);
@@ -157,6 +158,14 @@ Policy *learned_policy(const char *path, const TaskDef *task, const Robot *robot
         policy_destroy(policy);
         return NULL;
     }
+    if (def->scan != shape.scan) {
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%s: this policy sees %d points of the ground and the task has %d (task.scan, "
+                  "scan_ahead, scan_pitch); leave these keys to the policy's file",
+                  path, def->scan, shape.scan);
+        policy_destroy(policy);
+        return NULL;
+    }
     return policy;
 }
 
@@ -185,6 +194,7 @@ MildStatus controller_make_learned(const ControllerDef *def, Controller *control
                   .pool = def->pool,
                   .rows_max = rows_max,
                   .width = (size_t)shape.history,
+                  .frame = (size_t)shape.observation,
                   .history = history,
                   .inside = {.estimates = shape.estimates, .rows = {.estimates = estimates}}};
     *controller = (Controller){.self = learned,

@@ -526,6 +526,35 @@ MILD_HD void env_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
     }
 }
 
+/* The numbers of a scan [shape.scan]. The batch engine has no imprints. */
+MILD_HD_FN void env_read_scan(const EnvsArrays *all, long robot, const TaskScan *scan, float *to) {
+    const EnvsTask *task = all->task;
+    const TaskEnv *env = env_at(all, robot);
+    const Real *base = scan->pose.at;
+    const EngineGround ground = env_surface(all, robot);
+    const MapSpot spot = base_spot(&ground, base);
+    for (int n = tile_lane(); n < task->shape.scan; n += TILE) {
+        Real way[2];
+        task_scan_point(&task->task, scan, n, way);
+        const Real height = surface_under(&ground, base, &spot, way[0], way[1]).height - base[2];
+        to[n] = task_scan_number(env, &task->task, &task->robot, scan, n, height);
+    }
+}
+
+/* Behind what task_observe has written. */
+MILD_HD_FN void env_observe_ground(const EnvsArrays *all, long robot, const EnvsView *view) {
+    TaskEnv *env = env_at(all, robot);
+    const TaskShape *shape = &all->task->shape;
+    const RobotReading *reading = env_reading(env_robot_at(all, robot));
+    task_scan_keep(env, reading);
+    const TaskScan seen = task_scan_seen(env, &all->task->task);
+    env_read_scan(all, robot, &seen, view->history + shape->history - shape->scan);
+    if (view->critic) {
+        const TaskScan now = task_scan_true(env, reading);
+        env_read_scan(all, robot, &now, view->critic + shape->critic - shape->scan);
+    }
+}
+
 MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot) {
     TaskEnv *env = env_at(all, robot);
     const TaskShape *shape = &env->shape;
@@ -539,6 +568,9 @@ MILD_HD void env_observe(const EnvsArrays *all, const EnvsStep *call, long robot
     tile_sync();
     task_observe(env, &all->task->task, &all->task->robot, env_reading(own),
                  all->task->ground[env->ground[own->label]].numbers, &own->sensors, reset, &view);
+    if (shape->scan > 0) {
+        env_observe_ground(all, robot, &view);
+    }
 }
 
 /* ---- save and fork: envs.h ---- */

@@ -50,13 +50,15 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
 }
 
 void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int to) {
-    const int observation = context->network->def.observation, width = context->network->history;
+    const Network *n = context->network;
+    const int observation = n->def.observation, width = n->history, end = width - n->def.scan;
     const int *index = context->mirror->observation_index;
     const float *sign = context->mirror->observation_sign;
     const float *o = chunk->history + (int64_t)from * width;
     float *m = chunk->history + (int64_t)to * width;
-    for (int f = 0; f < width; f += observation) {
-        for (int i = 0; i < observation; i++) {
+    for (int f = 0; f < end; f += observation) {
+        const int numbers = f + observation < end ? observation : n->newest;
+        for (int i = 0; i < numbers; i++) {
             m[f + i] = sign[i] * o[f + index[i]];
         }
     }
@@ -271,10 +273,9 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
     mlp_backward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input,
                  &chunk->decoder, chunk->d_decoded, chunk->work, gradient, beta,
                  (MlpInputGradient){chunk->d_decoder_input, 0, n->decoder_input});
-    mlp_backward(
-        &n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor, chunk->d_mean,
-        chunk->work, gradient, beta,
-        (MlpInputGradient){chunk->d_actor_input, def->observation, def->estimates + def->latent});
+    mlp_backward(&n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor,
+                 chunk->d_mean, chunk->work, gradient, beta,
+                 (MlpInputGradient){chunk->d_actor_input, n->newest, def->estimates + def->latent});
     modulation_backward(c, chunk, all, heads);
     mlp_backward(&n->modulation, c->parameters, all, out->modulation_input, n->feet + n->clock,
                  &out->modulation, chunk->d_theta, chunk->work, gradient, beta,

@@ -71,10 +71,10 @@ static MildStatus check_def(const PolicyDef *def, MildError *error) {
     if (status) {
         return status;
     }
-    if ((int64_t)def->frames * def->observation > WIDTH_MAX) {
+    if (def->scan < 0 || (int64_t)def->frames * def->observation + def->scan > WIDTH_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "policy: %d frames of %d numbers are more than %d", def->frames,
-                         def->observation, WIDTH_MAX);
+                         "policy: %d frames of %d numbers and a scan of %d are more than %d",
+                         def->frames, def->observation, def->scan, WIDTH_MAX);
     }
     if (def->actions < 1 || def->actions > NETWORK_ACTIONS_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "policy.actions = %d is outside 1..%d",
@@ -107,12 +107,13 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
               phase = def->modulation_input == POLICY_INPUT_FEET_PHASE;
     memset(network, 0, sizeof *network);
     network->def = *def;
-    network->history = def->frames * def->observation;
+    network->history = policy_history(def);
+    network->newest = policy_newest(def);
     network->heads = def->estimates + 2 * def->latent;
     network->theta = def->modulation_per_dimension ? 2 * def->latent : 2;
     network->feet = phase ? def->estimates - def->feet_velocity_offset : def->feet_velocity_count;
     network->clock = phase ? NETWORK_CLOCK : 0;
-    network->actor_input = def->observation + def->estimates + def->latent;
+    network->actor_input = network->newest + def->estimates + def->latent;
     network->decoder_input = def->latent + def->estimates;
     network->decoded_frame = def->decoder_frame ? def->observation : 0;
     network->decoded = network->decoded_frame + def->ground_count;
@@ -216,13 +217,14 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
 }
 
-/* [feet's estimates | clock of the newest frame]. */
+/* [feet's estimates | clock of the newest frame, before the scan]. */
 static void fill_modulation_input(const Network *network, int rows, const float *history,
                                   const float *heads, float *input) {
     const int feet = network->feet, clock = network->clock;
     for (int r = 0; r < rows; r++) {
         memcpy(input, heads + network->def.feet_velocity_offset, (size_t)feet * sizeof *input);
-        memcpy(input + feet, history + network->history - clock, (size_t)clock * sizeof *input);
+        memcpy(input + feet, history + network->history - network->def.scan - clock,
+               (size_t)clock * sizeof *input);
         history += network->history;
         heads += network->heads;
         input += feet + clock;
@@ -243,21 +245,19 @@ static void modulate(const Network *network, const float *mu, const float *noise
     }
 }
 
-/* [newest frame | estimates | theta1 mu + theta2]; paper, "Terrain Estimator and Modulation Net".
- */
+/* [newest frame | scan | estimates | theta1 mu + theta2]; paper, "Terrain Estimator and Modulation
+ * Net". */
 static void fill_actor_input(const Network *network, int rows, const float *history,
                              const PolicyInstead *instead, const NetworkOutputs *outputs) {
-    const int observation = network->def.observation, estimates = network->def.estimates;
+    const int newest = network->newest, estimates = network->def.estimates;
     const float *heads = network_heads(network, outputs), *theta = network_theta(network, outputs);
     const float *noise = outputs->noise;
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
         const float *estimated = instead && instead->estimates ? instead->estimates : heads;
-        memcpy(input, history + network->history - observation,
-               (size_t)observation * sizeof *input);
-        memcpy(input + observation, estimated, (size_t)estimates * sizeof *input);
-        modulate(network, heads + estimates, noise, theta, instead,
-                 input + observation + estimates);
+        memcpy(input, history + network->history - newest, (size_t)newest * sizeof *input);
+        memcpy(input + newest, estimated, (size_t)estimates * sizeof *input);
+        modulate(network, heads + estimates, noise, theta, instead, input + newest + estimates);
         noise = noise ? noise + network->def.latent : NULL;
         history += network->history;
         heads += network->heads;

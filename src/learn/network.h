@@ -1,10 +1,10 @@
 /* The five networks in one flat parameter array, and the forward pass of rollout, play and loss.
  *
- *   heads   = encoder(history), [estimates | mu | logvar]
+ *   heads   = encoder(history), [estimates | mu | logvar]; the history is [frames | scan]
  *   theta   = modulation(estimated feet velocities), [theta1 | theta2]; with
  *             policy.modulation_input = feet_phase of [velocities | heights | clock]
  *   z~      = theta1 * z + theta2 (FiLM), z = mu; with ppo.sample_latent a draw, in training
- *   mean    = actor([newest frame | estimates | z~])
+ *   mean    = actor([newest frame | scan | estimates | z~])
  *   decoded = decoder([z | estimates]) = [frame | ground], in the loss only, with a sampled z
  *   value   = critic(critic input)
  *
@@ -31,12 +31,13 @@ typedef struct {
     int64_t critic_first; /* the critic's parameters are the range [critic_first, log_std) */
     int64_t log_std;      /* offset of the log standard deviations [actions] */
     int64_t count;        /* of parameters */
-    int history;          /* width: frames * observation */
+    int history;          /* width: frames * observation + scan */
+    int newest;           /* width of its end that the actor has: observation + scan */
     int heads;            /* width: estimates + 2 latent */
     int theta;            /* width: 2, or 2 latent */
     int feet;             /* estimates that the modulation reads, from feet_velocity_offset on */
     int clock;            /* numbers of the clock that it reads behind them: 0, NETWORK_CLOCK */
-    int actor_input;      /* width: observation + estimates + latent */
+    int actor_input;      /* width: newest + estimates + latent */
     int decoder_input;    /* width: latent + estimates */
     int decoded_frame;    /* width of the frame in the decoder's output: observation, or 0 */
     int decoded;          /* width of that output: decoded_frame + ground_count */

@@ -71,36 +71,65 @@ float *policy_parameters(Policy *policy) {
     return policy->parameters;
 }
 
-static int same_shape(const Mlp *a, const Mlp *b) {
-    int same = a->layers == b->layers;
+/* Bool: a has the layers of b, with `more` inputs besides. */
+static int same_shape(const Mlp *a, const Mlp *b, int more) {
+    int same = a->layers == b->layers && a->layer[0].in == b->layer[0].in + more;
     for (int l = 0; same && l < a->layers; l++) {
-        same = a->layer[l].in == b->layer[l].in && a->layer[l].out == b->layer[l].out;
+        same = a->layer[l].out == b->layer[l].out;
     }
     return same;
+}
+
+/* Takes a network into `to`, whose first layer has `more` inputs besides, from number `first` on:
+ * their weights are 0. */
+static void take_network(const Mlp *to, const Mlp *from, int first, int more, const float *source,
+                         float *parameters) {
+    const MlpLayer *head = &to->layer[0], *other = &from->layer[0];
+    const MlpLayer *last = &to->layer[to->layers - 1];
+    for (int row = 0; row < head->out; row++) {
+        float *w = parameters + head->weight + (int64_t)row * head->in;
+        const float *v = source + other->weight + (int64_t)row * other->in;
+        memcpy(w, v, (size_t)first * sizeof *w);
+        memset(w + first, 0, (size_t)more * sizeof *w);
+        memcpy(w + first + more, v + first, (size_t)(other->in - first) * sizeof *w);
+    }
+    memcpy(parameters + head->bias, source + other->bias,
+           (size_t)(last->bias + last->out - head->bias) * sizeof *parameters);
+}
+
+/* A scan that only the taker has: numbers of it in the inputs of a network, and the first. */
+static int scan_inputs(const Policy *policy, const Policy *from, const Mlp *mlp, int *first) {
+    const Network *own = &policy->network;
+    const int is_actor = mlp == &own->actor;
+    const int sees = is_actor || mlp == &own->encoder || mlp == &own->critic;
+    const int more = sees && from->network.def.scan == 0 ? own->def.scan : 0;
+    *first = is_actor ? own->def.observation : mlp->layer[0].in - more; /* the others: at the end */
+    return more;
 }
 
 int policy_take_networks(Policy *policy, const Policy *from) {
     const Network *own = &policy->network, *other = &from->network;
     const char *name;
-    int fits = own->def.actions == other->def.actions;
+    int fits = own->def.actions == other->def.actions, first;
     for (int n = 0; n < NETWORK_MLPS; n++) {
         const Mlp *mlp = network_mlp(own, n, &name);
-        fits &= mlp == &own->decoder || same_shape(mlp, network_mlp(other, n, &name));
+        const int more = scan_inputs(policy, from, mlp, &first);
+        fits &= mlp == &own->decoder || same_shape(mlp, network_mlp(other, n, &name), more);
     }
     if (!fits) {
         return 0;
     }
     for (int n = 0; n < NETWORK_MLPS; n++) {
         const Mlp *to = network_mlp(own, n, &name), *source = network_mlp(other, n, &name);
-        const MlpLayer *last = &to->layer[to->layers - 1];
-        if (same_shape(to, source)) {
-            const int64_t count = last->bias + last->out - to->layer[0].weight;
-            memcpy(policy->parameters + to->layer[0].weight,
-                   from->parameters + source->layer[0].weight, (size_t)count * sizeof(float));
+        const int more = scan_inputs(policy, from, to, &first);
+        if (same_shape(to, source, more)) {
+            take_network(to, source, first, more, from->parameters, policy->parameters);
         }
     }
-    memcpy(policy->parameters + own->log_std, from->parameters + other->log_std,
-           (size_t)own->def.actions * sizeof(float));
+    if (own->def.scan == other->def.scan) { /* else there is something new to explore */
+        memcpy(policy->parameters + own->log_std, from->parameters + other->log_std,
+               (size_t)own->def.actions * sizeof(float));
+    }
     network_hide_clock(own, policy->parameters);
     return 1;
 }
@@ -142,7 +171,7 @@ static void act_chunk(const PolicyJob *job, int first, int rows, NetworkOutputs 
                                                 job->input + (int64_t)first * network->history,
                                                 job->instead, outputs);
     const float *heads = network_heads(network, outputs);
-    const int modulated = def->observation + def->estimates;
+    const int modulated = network->newest + def->estimates;
     // NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): one without values wants actions
     memcpy(job->actions + (int64_t)first * def->actions, mean,
            (size_t)rows * (size_t)def->actions * sizeof *mean);

@@ -18,11 +18,13 @@ const PolicyDef *policy_def(const Policy *policy);
 int64_t policy_parameter_count(const Policy *policy);
 float *policy_parameters(Policy *policy); /* flat, policy_parameter_count() */
 /* Takes the networks of another policy. A decoder of another shape stays as it is, since no action
- * depends on it; returns 0, and takes nothing, when another network has another shape. */
+ * depends on it. From a policy without a scan, weights of the scan become 0, the mean actions are
+ * those of the other, and the noise stays as it is. Returns 0, and takes nothing, when another
+ * network has another shape. */
 int policy_take_networks(Policy *policy, const Policy *from);
 
 /* Deterministic action and estimates for `rows` histories (z = mu). history
- * [rows][frames*observation], actions [rows][actions] (mean), estimates [rows][estimates] (may be
+ * [rows][frames*observation + scan], actions [rows][actions] (mean), estimates [rows][estimates] (may be
  * NULL), latent [rows][latent] modulated z~ (may be NULL). Rows are processed in fixed chunks over
  * the pool (NULL: caller's thread). One caller at a time per policy. */
 void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,

@@ -17,6 +17,7 @@ typedef struct {
     char task[1024];          /* how it walks, see task/policy_keys.h; empty: not known */
     int observation;          /* width of one frame, 47; it ends with the gait clock: sin, cos */
     int frames;               /* frames in the history, newest last: H + 1 = 6 */
+    int scan;                 /* numbers behind the newest frame: a height scan; 0: none */
     int critic_input;         /* width of the critic's input, which begins with a noiseless frame */
     int actions;              /* 12 */
     int estimates;            /* 11: base velocity 3, feet velocities 6, feet heights 2 */
@@ -39,6 +40,13 @@ typedef struct {
     double init_std;                       /* initial standard deviation of the action noise */
 } PolicyDef;
 PolicyDef policy_def_default(void);
+/* Width of the history [frames | scan], and of what the actor has of it, [newest frame | scan]. */
+static inline int policy_history(const PolicyDef *def) {
+    return def->frames * def->observation + def->scan;
+}
+static inline int policy_newest(const PolicyDef *def) {
+    return def->observation + def->scan;
+}
 extern const MildField policy_fields[];
 extern const int policy_field_count;
 

@@ -19,6 +19,7 @@ static const MildField shape_fields[] = {
                "[-] first estimate of the feet velocities"),
     MILD_FIELD(PolicyDef, feet_velocity_count, MILD_FIELD_INT, 1, 1, 16384,
                "[-] estimates of feet velocities"),
+    MILD_FIELD(PolicyDef, scan, MILD_FIELD_INT, 1, 0, 16384, "[-] numbers of the height scan"),
 };
 #define SHAPE_FIELDS ((int)(sizeof shape_fields / sizeof *shape_fields))
 
@@ -40,7 +41,8 @@ static const MildField *file_field(int index) {
 /* Keys that came after the first files. A file without them has their defaults, which are not
  * written. */
 static int is_later(const MildField *field) {
-    return strcmp(field->name, "modulation_input") == 0 || strcmp(field->name, "actor_phase") == 0;
+    return strcmp(field->name, "modulation_input") == 0 ||
+           strcmp(field->name, "actor_phase") == 0 || strcmp(field->name, "scan") == 0;
 }
 
 static int is_written(const MildField *field, const PolicyDef *def) {

@@ -49,19 +49,18 @@ static void *take(Ppo *ppo, size_t bytes) {
 
 static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
     const PolicyDef *def = policy_def(ppo->policy);
-    const size_t observation = (size_t)def->observation, actions = (size_t)def->actions;
-    ppo->mirror_index = take(ppo, (observation + actions) * sizeof *ppo->mirror_index);
-    ppo->mirror_sign = take(ppo, (observation + actions) * sizeof *ppo->mirror_sign);
+    const size_t newest = (size_t)policy_newest(def), actions = (size_t)def->actions;
+    ppo->mirror_index = take(ppo, (newest + actions) * sizeof *ppo->mirror_index);
+    ppo->mirror_sign = take(ppo, (newest + actions) * sizeof *ppo->mirror_sign);
     if (!ppo->mirror_index || !ppo->mirror_sign) {
         return 0;
     }
-    memcpy(ppo->mirror_index, mirror->observation_index, observation * sizeof *ppo->mirror_index);
-    memcpy(ppo->mirror_index + observation, mirror->action_index,
-           actions * sizeof *ppo->mirror_index);
-    memcpy(ppo->mirror_sign, mirror->observation_sign, observation * sizeof *ppo->mirror_sign);
-    memcpy(ppo->mirror_sign + observation, mirror->action_sign, actions * sizeof *ppo->mirror_sign);
-    ppo->mirror = (PpoMirror){ppo->mirror_index, ppo->mirror_sign, ppo->mirror_index + observation,
-                              ppo->mirror_sign + observation};
+    memcpy(ppo->mirror_index, mirror->observation_index, newest * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_index + newest, mirror->action_index, actions * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_sign, mirror->observation_sign, newest * sizeof *ppo->mirror_sign);
+    memcpy(ppo->mirror_sign + newest, mirror->action_sign, actions * sizeof *ppo->mirror_sign);
+    ppo->mirror = (PpoMirror){ppo->mirror_index, ppo->mirror_sign, ppo->mirror_index + newest,
+                              ppo->mirror_sign + newest};
     ppo->mirror_rows = (int)(ppo->def.mirror_share * PPO_CHUNK + 0.5);
     return 1;
 }
@@ -124,10 +123,12 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
 }
 
 static MildStatus check_mirror(const PolicyDef *def, const PpoMirror *mirror, MildError *error) {
-    for (int i = 0; mirror && mirror->observation_index && i < def->observation; i++) {
-        if (mirror->observation_index[i] < 0 || mirror->observation_index[i] >= def->observation) {
+    for (int i = 0; mirror && mirror->observation_index && i < policy_newest(def); i++) {
+        const int first = i < def->observation ? 0 : def->observation;
+        const int end = i < def->observation ? def->observation : policy_newest(def);
+        if (mirror->observation_index[i] < first || mirror->observation_index[i] >= end) {
             return mild_fail(error, MILD_ERROR_RANGE, "mirror: observation %d maps to %d of %d", i,
-                             mirror->observation_index[i], def->observation);
+                             mirror->observation_index[i], end);
         }
     }
     for (int i = 0; mirror && mirror->observation_index && i < def->actions; i++) {

@@ -7,7 +7,7 @@
 /* The rollout. The environments write directly into these arrays, [time][environment][...]. */
 typedef struct {
     int steps, envs;
-    float *history; /* [steps+1][envs][frames*observation] */
+    float *history; /* [steps+1][envs][frames*observation + scan] */
     float *critic;  /* [steps+1][envs][critic_input] */
     float *target;  /* [steps+1][envs][estimates] true estimates for the regression heads */
     /* [steps+1][envs][observation] Newest frame, as the policy saw it. The update may replace rows

@@ -69,11 +69,11 @@ void ppo_set_decoder(const PpoDef *def, int ground_offset, int ground_count, Pol
 extern const MildField ppo_fields[];
 extern const int ppo_field_count;
 
-/* Mirror symmetry of the problem: o'_i = sign_i * o_perm_i for one frame and for the action. NULL
- * perm: no mirror loss. */
+/* Mirror symmetry of the problem: o'_i = sign_i * o_perm_i for one frame, behind the newest one for
+ * the scan, and for the action. NULL perm: no mirror loss. */
 typedef struct {
-    const int *observation_index;  /* [observation] */
-    const float *observation_sign; /* [observation] */
+    const int *observation_index;  /* [observation + scan] */
+    const float *observation_sign; /* [observation + scan] */
     const int *action_index;       /* [actions] */
     const float *action_sign;      /* [actions] */
 } PpoMirror;

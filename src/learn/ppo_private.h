@@ -50,8 +50,8 @@ typedef struct Ppo {
     PpoBackend backend; /* act NULL: the CPU */
     MildError error;    /* of the backend */
     PpoMirror mirror;   /* observation_index NULL: none */
-    int *mirror_index;  /* [observation + actions] the arrays that `mirror` points to */
-    float *mirror_sign; /* [observation + actions] */
+    int *mirror_index;  /* [newest + actions] the arrays that `mirror` points to */
+    float *mirror_sign; /* [newest + actions] */
     uint64_t seed;
     Ranks *ranks;   /* NULL: alone */
     OrderPart part; /* that this process has */

@@ -151,10 +151,12 @@ static void compare_rows(const char *what, int when, int env, const float *a, co
 static void compare(int when, int env, double tolerance) {
     const TaskShape *shape = &pair.shape;
     const Rows *a = &pair.a, *b = &pair.b;
-    const int width = shape->observation, older = shape->history - width;
+    const int width = shape->observation, older = (TASK_FRAMES - 1) * width;
     const float *history = a->history + env * shape->history;
     const float *other = b->history + env * shape->history;
     compare_rows("newest", when, env, history + older, other + older, width, tolerance);
+    compare_rows("scan", when, env, history + older + width, other + older + width, shape->scan,
+                 tolerance);
     for (int i = 0; i < older; i++) { /* of frames in 16 bits */
         const double rounding = fabs((double)history[i]) * 0x1p-11 + 6e-5;
         compare_rows("older", when, env, history + i, other + i, 1, tolerance + rounding);

@@ -19,6 +19,19 @@ TEST(follows_mujoco_on_a_map) {
     follow(SA01, some_def(), MILD_BATCH_HOST, &map, 0.85);
 }
 
+/* What it sees of the ground, late and with noise. */
+static TaskDef scan_def(void) {
+    TaskDef def = some_def();
+    def.scan = 5;
+    return def;
+}
+
+TEST(follows_mujoco_with_a_scan) {
+    MildMapDef map = some_map();
+    follow(SA01, scan_def(), MILD_BATCH_HOST, &map, 0.85);
+    follow(SA01, scan_def(), MILD_BATCH_HOST, NULL, 0.85);
+}
+
 /* The keys of the paper's own training (configs/paper.ini), whose ground creates energy. */
 static TaskDef printed_def(void) {
     TaskDef def = some_def();
@@ -99,6 +112,7 @@ TEST(device_follows_mujoco) {
     follow(SA01, some_def(), 0, &map, 0.85);
     follow(SA01, coarse_def(), 0, NULL, 0.85);
     follow(SA01, printed_def(), 0, NULL, 0.65);
+    follow(SA01, scan_def(), 0, &map, 0.85);
     follow(GO1, some_def(), 0, NULL, 0.85);
     follow(GO1, some_def(), 0, &map, 0.85);
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI), 0, NULL, 0.85);

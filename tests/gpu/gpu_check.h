@@ -29,7 +29,8 @@ typedef struct {
 
 /* Swaps neighbours and changes every third sign: its own inverse, as a mirror is. */
 static inline PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
-    const int count = def->observation > def->actions ? def->observation : def->actions;
+    const int newest = policy_newest(def);
+    const int count = newest > def->actions ? newest : def->actions;
     for (int i = 0; i < count; i++) {
         l->mirror_index[i] = i;
         l->mirror_sign[i] = i % 3 ? 1.0f : -1.0f;
@@ -37,6 +38,9 @@ static inline PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
     for (int i = 0; i + 1 < def->actions && i + 1 < def->observation; i += 2) {
         l->mirror_index[i] = i + 1;
         l->mirror_index[i + 1] = i;
+    }
+    for (int i = 0; i < def->scan; i++) { /* within the scan */
+        l->mirror_index[def->observation + i] = newest - 1 - i;
     }
     return (PpoMirror){l->mirror_index, l->mirror_sign, l->mirror_index, l->mirror_sign};
 }

@@ -256,6 +256,9 @@ TEST(gradients_are_those_of_the_cpu) {
     compare_learner(&small, &def, 37, 0, worst);
     small.modulation_input = POLICY_INPUT_FEET;
     compare_learner(&small, &def, 37, 100, worst);
+    small.scan = 9;
+    compare_learner(&small, &def, 37, 100, worst);
+    small.scan = 0;
     small.latent = 270; /* rows wider than a block of threads */
     small.critic_input = 300;
     ppo_set_decoder(&def, 4, 290, &small);

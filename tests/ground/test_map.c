@@ -57,6 +57,37 @@ TEST(test_shapes) {
     mild_map_destroy(map);
 }
 
+/* Blocks of 0.7 m with the origin in the middle of one: each level, at 0, half or all of what |x| of
+ * its middle allows; 8 x 8 of them, then again. */
+TEST(test_blocks) {
+    enum { BLOCKS = 8 };
+    static const double away[BLOCKS] = {0.0, 0.7, 1.4, 2.1, 2.8, 2.1, 1.4, 0.7}; /* [m] */
+    MildMapDef def = shape(MILD_MAP_BLOCKS, 0.16, 0.7);
+    def.size = 5.6;
+    for (int bound = 0; bound < 2; bound++) {
+        int count[3] = {0};
+        def.slope = bound ? 0.1 : 0.0;
+        MildMap *map = make_map(&def);
+        MildTerrain terrain = terrain_on(map, 0.0);
+        for (int n = 0; n < BLOCKS * BLOCKS; n++) {
+            const double x = 0.7 * (n % BLOCKS), y = 0.7 * (n / BLOCKS);
+            const double most = bound ? fmin(0.16, 0.1 * away[n % BLOCKS]) : 0.16;
+            const double height = mild_terrain_height_at(&terrain, x, y);
+            const double level = most > 0.0 ? 2.0 * height / most : 0.0;
+            assert_true(fabs(level - round(level)) < 1e-6 && height >= 0.0 && level < 2.5);
+            count[(int)round(level)] += most > 0.0;
+            for (int k = 0; k < 4; k++) { /* near its corners, and a period away */
+                const double u = x + (k % 2 ? 0.32 : -0.32), v = y + (k / 2 ? 0.32 : -0.32);
+                assert_true(fabs(mild_terrain_height_at(&terrain, u - 5.6, v) - height) < 1e-8);
+                assert_true(fabs(mild_terrain_height_at(&terrain, u, v + 5.6) - height) < 1e-8);
+            }
+            assert_true(height == 0.0 || most > 0.0);
+        }
+        assert_true(count[0] > 8 && count[1] > 8 && count[2] > 8);
+        mild_map_destroy(map);
+    }
+}
+
 TEST(test_rough) {
     uint64_t random = 42;
     MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);

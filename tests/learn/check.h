@@ -27,10 +27,10 @@ static inline PolicyDef small_def(void) {
     return def;
 }
 
-/* Left and right of its five numbers of a frame and two actions. */
+/* Left and right of its five numbers of a frame, three of a scan and two actions. */
 static inline PpoMirror small_mirror(void) {
-    static const int observation[] = {0, 2, 1, 4, 3}, action[] = {1, 0};
-    static const float observation_sign[] = {-1, 1, 1, -1, -1}, action_sign[] = {-1, -1};
+    static const int observation[] = {0, 2, 1, 4, 3, 7, 6, 5}, action[] = {1, 0};
+    static const float observation_sign[] = {-1, 1, 1, -1, -1, 1, -1, 1}, action_sign[] = {-1, -1};
     return (PpoMirror){observation, observation_sign, action, action_sign};
 }
 

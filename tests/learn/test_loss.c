@@ -89,10 +89,10 @@ static void assert_near(const char *what, double ours, double theirs, double tol
 /* ---- the loss in double, straight from its formulas ---- */
 
 /* Numbers that encoder and actor see: of frames that end with the clock, with 0 in its place if
- * they are not to see it. */
+ * they are not to see it, and of the scan behind them. */
 static void seen_double(const PolicyDef *d, const double *frames, int count, double *seen) {
-    for (int i = 0; i < count; i++) {
-        const int is_clock = i % d->observation >= d->observation - 2;
+    for (int i = 0; i < count * d->observation + d->scan; i++) {
+        const int is_clock = i < count * d->observation && i % d->observation >= d->observation - 2;
         seen[i] = is_clock && !d->actor_phase ? 0.0 : frames[i];
     }
 }
@@ -101,10 +101,10 @@ static void seen_double(const PolicyDef *d, const double *frames, int count, dou
 static void act_double(const Network *n, const double *p, const double *history, const float *noise,
                        double *heads, double *mean) {
     const PolicyDef *d = &n->def;
-    const double *frame = history + n->history - d->observation;
-    const int from = d->feet_velocity_offset;
+    const int from = d->feet_velocity_offset, newest = d->observation + d->scan;
+    const double *frame = history + n->history - newest;
     double theta[64], input[64], feet[64];
-    seen_double(d, history, n->history, input);
+    seen_double(d, history, d->frames, input);
     mlp_double(&n->encoder, p, input, heads);
     if (d->modulation_input == POLICY_INPUT_FEET_PHASE) { /* all estimates behind the base's */
         memcpy(feet, heads + from, (size_t)(d->estimates - from) * sizeof *feet);
@@ -113,14 +113,14 @@ static void act_double(const Network *n, const double *p, const double *history,
         memcpy(feet, heads + from, (size_t)d->feet_velocity_count * sizeof *feet);
     }
     mlp_double(&n->modulation, p, feet, theta);
-    seen_double(d, frame, d->observation, input);
-    memcpy(input + d->observation, heads, (size_t)d->estimates * sizeof *input);
+    seen_double(d, frame, 1, input);
+    memcpy(input + newest, heads, (size_t)d->estimates * sizeof *input);
     for (int j = 0; j < d->latent; j++) {
         int a = d->modulation_per_dimension ? j : 0,
             b = d->modulation_per_dimension ? d->latent + j : 1;
         const double spread = exp(0.5 * heads[d->estimates + d->latent + j]),
                      z = heads[d->estimates + j] + (noise ? spread * (double)noise[j] : 0.0);
-        input[d->observation + d->estimates + j] = theta[a] * z + theta[b];
+        input[newest + d->estimates + j] = theta[a] * z + theta[b];
     }
     mlp_double(&n->actor, p, input, mean);
 }
@@ -199,7 +199,8 @@ static double loss_double(const Case *c, const double *p, LossSums *sums) {
     for (int r = 0; r < ROWS; r++) {
         double history[64], image[64], heads[64], mean[8], turned[8];
         for (int i = 0; i < n->history; i++) {
-            int f = i / d->observation * d->observation, k = i % d->observation;
+            const int last = (d->frames - 1) * d->observation; /* and the scan */
+            const int f = i < last ? i / d->observation * d->observation : last, k = i - f;
             history[i] = c->chunk.history[r * n->history + i];
             image[i] =
                 (double)c->mirror.observation_sign[k] *
@@ -227,7 +228,7 @@ static void clear_clock(Case *c) {
     float *encoder = c->parameters + c->network.encoder.layer[0].weight;
     float *first = c->parameters + c->network.actor.layer[0].weight;
     for (int i = 0; !c->network.def.actor_phase && i < c->network.encoder.layer[0].out; i++) {
-        for (int k = 0; k < c->network.history; k++) {
+        for (int k = 0; k < c->network.def.frames * observation; k++) {
             const int is_clock = k % observation >= observation - 2;
             encoder[i * c->network.history + k] *= is_clock ? 0.0f : 1.0f;
         }
@@ -334,6 +335,16 @@ TEST(test_phase_matches_differences) {
     def.modulation_input = POLICY_INPUT_FEET;
     def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0;
     check_differences(def, 1, 0.0, 0, 24);
+}
+
+/* A scan behind the newest frame, which encoder and actor see whole, and its mirror image. */
+TEST(test_scan_matches_differences) {
+    PolicyDef def = small_def();
+    def.scan = 3;
+    check_differences(def, 1, 0.0, 0, 31);
+    def.modulation_input = POLICY_INPUT_FEET_PHASE;
+    def.actor_phase = 0;
+    check_differences(def, 0, 0.0, 1, 32);
 }
 
 /* What the decoder rebuilds, each part with the mean of its own; and free bits. */

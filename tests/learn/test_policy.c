@@ -212,6 +212,40 @@ TEST(test_actor_without_the_clock) {
     policy_destroy(clock);
 }
 
+/* A policy with a scan takes one without: actions and values are the same, whatever is seen, and
+ * the noise is its own. */
+TEST(test_scan_begins_unseen) {
+    enum { SCAN = 3, FRAMES = 15, CRITIC = 7 };
+    PolicyDef def = small_def();
+    Policy *blind = clock_policy(POLICY_INPUT_FEET, 1);
+    def.scan = SCAN;
+    def.critic_input += SCAN;
+    def.init_std = 0.3;
+    Policy *seeing = policy_create(&def, 3, NULL), *again = policy_create(&def, 4, NULL);
+    Random random = random_at(15, 0, 0);
+    float history[FRAMES + SCAN], critic[CRITIC + SCAN], actions[2][2], values[2];
+    const PolicyRows one = {.blocks = 1, .runs = 1, .cut = {0, 1}};
+    fill_normal(history, FRAMES + SCAN, 1.0, &random);
+    fill_normal(critic, CRITIC + SCAN, 1.0, &random);
+    assert_false(policy_take_networks(blind, seeing));
+    assert_true(policy_take_networks(seeing, blind));
+    policy_act(blind, NULL, 1, history, actions[0], NULL, NULL);
+    policy_act(seeing, NULL, 1, history, actions[1], NULL, NULL);
+    policy_value_rows(blind, NULL, &one, critic, &values[0]);
+    policy_value_rows(seeing, NULL, &one, critic, &values[1]);
+    for (int i = 0; i < 2; i++) {
+        expect_near("action", (double)actions[1][i], (double)actions[0][i], 1e-6);
+    }
+    expect_near("value", (double)values[1], (double)values[0], 1e-6);
+    expect_near("noise", (double)policy_std(seeing)[1], 0.3, 1e-6);
+    assert_true(policy_take_networks(again, seeing)); /* of one shape */
+    assert_memory_equal(policy_parameters(again), policy_parameters(seeing),
+                        (size_t)policy_parameter_count(again) * sizeof(float));
+    policy_destroy(again);
+    policy_destroy(seeing);
+    policy_destroy(blind);
+}
+
 /* A file whose weights see the clock that it denies is refused. */
 TEST(test_clock_that_is_denied) {
     static const int places[][2] = {{0, 3}, {0, 14}, {5, 8}}; /* row, column of the encoder */

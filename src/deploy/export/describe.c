@@ -107,7 +107,7 @@ static void add_rules(Description *d, const Export *export) {
 
 MildStatus describe(const Export *export, Description *description, MildError *error) {
     TaskGains gains;
-    MildStatus status = task_def_check_no_jump(export->task, "export", error);
+    MildStatus status = task_def_check_plain(export->task, "export", error);
     status = status == MILD_OK ? task_gains(export->task, export->robot, &gains, error) : status;
     description->count = 0;
     if (status == MILD_OK) {

@@ -157,6 +157,39 @@ static void place(TaskEnv *env, const Robot *robot, RobotSim *sim) {
     env->robot.qpos[2] += level - lowest;
 }
 
+/* The numbers of a scan [shape.scan]. */
+static void read_scan(TaskEnv *env, const TaskDef *def, const Robot *robot, const TaskScan *scan,
+                      float *to) {
+    const MildTerrain *terrain = task_env_terrain(env);
+    const MildGround *ground = task_env_ground(env);
+    const double *at = scan->pose.at;
+    for (int n = 0; n < env->shape.scan; n++) {
+        double way[2];
+        task_scan_point(def, scan, n, way);
+        const double x = at[0] + way[0], y = at[1] + way[1];
+        double height = mild_terrain_height_at(terrain, x, y) - at[2];
+        if (def->imprint_tiles > 0 && !env->variation.rigid) {
+            const int material = mild_terrain_material_at(terrain, x, y);
+            height -=
+                (1 - terrain->materials[material].recovery) * mild_ground_imprint_at(ground, x, y);
+        }
+        to[n] = task_scan_number(env, def, robot_table(robot), scan, n, height);
+    }
+}
+
+/* Behind what task_observe has written. */
+static void observe_ground(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                           const RobotReading *reading, const EnvsView *view) {
+    const TaskShape *shape = &env->shape;
+    task_scan_keep(env, reading);
+    const TaskScan seen = task_scan_seen(env, def);
+    read_scan(env, def, robot, &seen, view->history + shape->history - shape->scan);
+    if (view->critic) {
+        const TaskScan now = task_scan_true(env, reading);
+        read_scan(env, def, robot, &now, view->critic + shape->critic - shape->scan);
+    }
+}
+
 /* Into the block's history, of which the view has a copy. */
 static void observe(TaskEnv *env, const TaskDef *def, const Robot *robot,
                     const RobotReading *reading, const TaskSensors *sensors, int first,
@@ -171,6 +204,9 @@ static void observe(TaskEnv *env, const TaskDef *def, const Robot *robot,
         task_ground_numbers(robot, &terrain->materials[material], ground);
     }
     task_observe(env, def, robot_table(robot), reading, ground, sensors, first, &own);
+    if (env->shape.scan > 0) {
+        observe_ground(env, def, robot, reading, &own);
+    }
     if (view->history) {
         memcpy(view->history, own.history, (size_t)env->shape.history * sizeof *own.history);
     }

@@ -15,6 +15,7 @@
 #define TASK_RANDOM_RIGID 0x52494749u
 #define TASK_RANDOM_SHELLS 0x5348454cu
 #define TASK_RANDOM_MAP 0x4d415050u
+#define TASK_RANDOM_SIGHT 0x53494748u
 #define TASK_RANDOM_COMMAND 0x434f4d4du
 
 /* Uniform in the range. */
@@ -76,6 +77,9 @@ MILD_HD_FN void task_draw_robot(TaskEnv *env, const TaskDef *def, Random r) {
     env->lag_command = task_draw_lag(&r, def);
     env->lag_motor = task_draw_lag(&r, def);
     env->lag_imu = task_draw_lag(&r, def);
+    Random sight = random_at(env->seed ^ TASK_RANDOM_SIGHT, env->index, env->tick);
+    env->lag_scan = (int)(task_draw(&sight, z->scan_delay) / TASK_PERIOD + 0.5);
+    env->scan_offset = (Real)task_spread(&sight, z->scan_offset);
     tile_sync();
 }
 

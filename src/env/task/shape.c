@@ -1,4 +1,5 @@
 /* Widths of a robot's observations, and their mirror image. */
+#include "env/task/scan.h"
 #include "env/task/task.h"
 
 #define TASK_END_NAME(name, help) #name,
@@ -18,10 +19,11 @@ TaskShape task_shape(const TaskDef *def, const Robot *robot) {
     TaskShape shape = {.joints = joints,
                        .feet = feet,
                        .observation = 9 + 3 * joints + frame_last(def),
+                       .scan = def->scan > 0 ? task_scan_rows(def) * task_scan_columns(def) : 0,
                        .actions = joints,
                        .estimates = 3 + 4 * feet};
-    shape.history = TASK_FRAMES * shape.observation;
-    shape.critic = shape.observation + shape.estimates + 6 * feet + 34;
+    shape.history = TASK_FRAMES * shape.observation + shape.scan;
+    shape.critic = shape.observation + shape.estimates + 6 * feet + 34 + shape.scan;
     return shape;
 }
 
@@ -57,5 +59,10 @@ TaskMirror task_mirror(const TaskDef *def, const Robot *robot) {
         mirror.observation_sign[at++] = sign;                                                      \
     }
     TASK_FRAME_LIST(FRAME_MIRROR)
+    const int scan = task_shape(def, robot).scan, columns = task_scan_columns(def);
+    for (int n = 0; n < scan; n++) { /* left and right points of a row change places */
+        mirror.observation_index[at + n] = at + n + columns - 1 - 2 * (n % columns);
+        mirror.observation_sign[at + n] = 1;
+    }
     return mirror;
 }

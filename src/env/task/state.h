@@ -48,22 +48,29 @@ enum { TASK_FORWARD, TASK_LEFT, TASK_TURN, TASK_RISE, TASK_COMMANDS };
 #define TASK_FRAME_ONE(name, has, value, sign) "."
 enum { TASK_FRAME_LAST = (int)sizeof(TASK_FRAME_LIST(TASK_FRAME_ONE)) - 1 }; /* rows of it */
 
+/* A number of the scan (scan.h): [1/m] its scale, [m] beyond which it says no more. */
+#define TASK_SCAN_SCALE 5
+#define TASK_SCAN_CLIP REAL(1)
+enum { TASK_SCAN_MAX = 256 }; /* points */
+
 /* Numbers per environment; they follow from the robot's joints and feet, and from the task. */
 typedef struct {
     int joints;
     int feet;
     int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds
                         and last actions, those of TASK_FRAME_LIST (observe.h) */
-    int history;     /* TASK_FRAMES frames */
+    int scan;        /* points of the height scan (scan.h); 0: none */
+    int history;     /* TASK_FRAMES frames, then the scan */
     int actions;     /* one per joint */
     int estimates;   /* base velocity 3, feet velocities 3 each, feet heights */
-    int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h) */
+    int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h), scan */
 } TaskShape;
 enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
        TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + TASK_FRAME_LAST,
-       TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX,
+       TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX + TASK_SCAN_MAX,
        TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
-       TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
+       TASK_CRITIC_MAX =
+           TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34 + TASK_SCAN_MAX
 };
 TaskShape task_shape(const TaskDef *def, const Robot *robot);
 MILD_HD_FN float *task_row(float *rows, long i, int width) {
@@ -83,10 +90,11 @@ int task_critic_ground(const TaskShape *shape);
 /* Numbers of the ground in the critic's input (task_ground_numbers). */
 enum { TASK_GROUND_NUMBERS = 12 };
 
-/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i, and actions alike. */
+/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i of a frame and, behind the newest one, the
+ * scan; and actions alike. */
 typedef struct {
-    int observation_index[TASK_OBSERVATION_MAX];
-    float observation_sign[TASK_OBSERVATION_MAX];
+    int observation_index[TASK_OBSERVATION_MAX + TASK_SCAN_MAX];
+    float observation_sign[TASK_OBSERVATION_MAX + TASK_SCAN_MAX];
     int action_index[ROBOT_JOINTS_MAX];
     float action_sign[ROBOT_JOINTS_MAX];
 } TaskMirror;
@@ -158,6 +166,8 @@ typedef struct {
     Real strength;                       /* [-] of all torques */
     Real motor_offset[TASK_JOINTS];      /* [rad] */
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    int lag_scan;                        /* [policy steps] */
+    Real scan_offset;                    /* [m] error of the heights that it sees */
     double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
                             persists across episodes */
     double command_most; /* [m/s or m] highest command, see task_command_adapt; persists */

@@ -10,6 +10,7 @@
 #include "env/task/observe.h"
 #include "env/task/randomize.h"
 #include "env/task/reward.h"
+#include "env/task/scan.h"
 
 #define TASK_RANDOM_START 0x53544152u
 #define TASK_RANDOM_PUSH 0x50555348u
@@ -29,10 +30,13 @@ MILD_HD_FN uint32_t task_frames_held(const TaskDef *def) {
     return (uint32_t)((TASK_FRAMES - 1) * def->history_stride);
 }
 
-/* Of a TaskEnv and its frames, which follow it. */
+/* Of a TaskEnv, its frames, which follow it, and the poses of its scans. */
 MILD_HD_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
+    const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
     return task_whole_lines(sizeof(TaskEnv) +
-                            held * (size_t)shape->observation * sizeof(TaskFrame));
+                            (shape->scan > 0
+                                 ? task_scan_place(frames) + TASK_SCAN_POSES * sizeof(TaskScanPose)
+                                 : frames));
 }
 
 /* A new environment. */

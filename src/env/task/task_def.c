@@ -4,6 +4,8 @@
 
 #include "env/task/task_def.h"
 
+#include "env/task/scan.h"
+
 #include "robot/float/float_ground.h"
 #include "robot/robot.h"
 
@@ -49,6 +51,9 @@ TaskDef task_def_default(void) {
         .noise_qd = 0.19,
         .noise_omega = 0.3,
         .noise_gravity = 0.075,
+        .scan_ahead = {-0.3, 0.7},
+        .scan_pitch = 0.1,
+        .scan_hold = 3,
         .velocity_scale = 4,
         .height_scale = 10,
         .tilt_limit = 1.0,
@@ -98,6 +103,10 @@ TaskDef task_def_default(void) {
                       .gain = {0.9, 1.1},
                       .strength = {0.9, 1.1},
                       .latency = {0.001, 0.010},
+                      .scan_noise = 0.02,
+                      .scan_offset = 0.03,
+                      .scan_delay = {0.02, 0.06},
+                      .scan_drop = 0.02,
                       .push_interval = 8,
                       .push_linear = 0.4,
                       .push_angular = 0.6,
@@ -224,6 +233,14 @@ const MildField task_fields[] = {
     T(noise_qd, D, 1, 0, 5, "[-] bound of the uniform noise of joint speeds, in units of 20 rad/s"),
     T(noise_omega, D, 1, 0, 5, "[rad/s] bound of the uniform noise of the angular velocity"),
     T(noise_gravity, D, 1, 0, 1, "[-] bound of the uniform noise of the unit vector along gravity"),
+    T(scan, MILD_FIELD_INT, 1, 0, 64,
+      "[-] points across the height scan, by which actor, encoder and critic see the ground; 0: they "
+      "do not"),
+    T(scan_ahead, D, 2, -2, 4,
+      "[m] its rearmost and foremost points, from the base along its heading"),
+    T(scan_pitch, D, 1, 0.01, 1, "[m] from point to point, along and across"),
+    T(scan_hold, MILD_FIELD_INT, 1, 1, 10,
+      "[-] policy steps from one scan to the next: 3 are 33 Hz"),
     T(velocity_scale, D, 1, 0.01, 100,
       "[-] scale of the base velocity among the estimates; its error counts with the square"),
     T(height_scale, D, 1, 0.01, 100, "[-] scale of the feet heights among the estimates"),
@@ -356,6 +373,10 @@ const MildField randomize_fields[] = {
     Z(strength, 2, 0.1, 3, "[-] scale of the torque, low and high (vendor, narrower)"),
     Z(latency, 2, 0, 0.01,
       "[s] delay of the command, of motor readings and of IMU readings, low and high (paper)"),
+    Z(scan_noise, 1, 0, 1, "[m] bound of the uniform noise of each height of the scan"),
+    Z(scan_offset, 1, 0, 1, "[m] bound of the error of all its heights, drawn per episode"),
+    Z(scan_delay, 2, 0, 0.2, "[s] from a scan to the policy, drawn per episode, low and high"),
+    Z(scan_drop, 1, 0, 1, "[-] share of its numbers that read 0"),
     Z(push_interval, 1, 0, 1000, "[s] time between pushes; 0: no pushes (vendor)"),
     Z(push_linear, 1, 0, 5, "[m/s] bound of a push on each horizontal axis (vendor)"),
     Z(push_angular, 1, 0, 5, "[rad/s] bound of a push about each axis (vendor)"),
@@ -476,12 +497,29 @@ MildStatus task_set_robot(const TaskDef *def, Robot *robot, MildError *error) {
                                          def->sole_elements, cause.text);
 }
 
-MildStatus task_def_check_no_jump(const TaskDef *def, const char *what, MildError *error) {
-    return def->jump[1] > 0 ? mild_fail(error, MILD_ERROR_ARGUMENT,
-                                        "%s: the policy was trained to jump (task.jump); train, "
-                                        "eval and play command jumps",
-                                        what)
-                            : MILD_OK;
+MildStatus task_def_check_plain(const TaskDef *def, const char *what, MildError *error) {
+    if (def->jump[1] > 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s: the policy was trained to jump (task.jump); train, eval and play "
+                         "command jumps",
+                         what);
+    }
+    return def->scan > 0 ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                                     "%s: the policy sees the ground (task.scan), as it does in "
+                                     "train, eval and play",
+                                     what)
+                         : MILD_OK;
+}
+
+/* Of a task that has one. */
+static MildStatus check_scan(const TaskDef *def, MildError *error) {
+    const int points = task_scan_rows(def) * task_scan_columns(def);
+    return def->scan == 0 || points <= TASK_SCAN_MAX
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_RANGE,
+                           "task.scan: %d rows of %d points are more than %d; give a larger "
+                           "task.scan_pitch",
+                           task_scan_rows(def), task_scan_columns(def), TASK_SCAN_MAX);
 }
 
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
@@ -506,6 +544,7 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE, "task.jump: %g is above %g", def->jump[0],
                          def->jump[1]);
     }
+    status = status == MILD_OK ? check_scan(def, error) : status;
     if (status == MILD_OK && def->contact_float &&
         (def->solver != MILD_SOLVER_NEWTON || def->contact_tolerance < FLOAT_GROUND_TOLERANCE)) {
         return mild_fail(error, MILD_ERROR_RANGE,

@@ -148,6 +148,10 @@ typedef struct {
     double gain[2];       /* [-] Kp and Kd, each joint */
     double strength[2];   /* [-] torque */
     double latency[2];    /* [s] command, motor reading, IMU reading: each drawn per episode */
+    double scan_noise;    /* [m] +- of each height of the scan */
+    double scan_offset;   /* [m] +- of all heights of an episode */
+    double scan_delay[2]; /* [s] from the scan to the policy */
+    double scan_drop;     /* [-] share of its numbers that read 0 */
     double push_interval; /* [s] 0: none */
     double push_linear, push_angular; /* [m/s], [rad/s] */
     double initial_joint;             /* [rad] +- around the default pose */
@@ -190,6 +194,10 @@ typedef struct {
     int clock;              /* bool: clock in the observation */
     int observe_noise;      /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
+    int scan;              /* points across the height scan (scan.h); 0: there is none */
+    double scan_ahead[2];  /* [m] rearmost and foremost points, from the base */
+    double scan_pitch;     /* [m] from point to point */
+    int scan_hold;         /* policy steps from one scan to the next */
     double velocity_scale; /* [-] of the base velocity among the estimates. 0.05 m/s is a tenth of a
                               slow walk, so it must matter to the regression and to the actor */
     double height_scale; /* [-] of the feet heights, so that centimetres count as much as velocities
@@ -238,8 +246,8 @@ MildModel task_model_soles(int model);
  * are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
-/* Fails for a task with jumps, which `what` does not command. */
-MildStatus task_def_check_no_jump(const TaskDef *def, const char *what, MildError *error);
+/* Fails for a task with jumps, which `what` does not command, or with a scan, which it has not. */
+MildStatus task_def_check_plain(const TaskDef *def, const char *what, MildError *error);
 /* The same as task_def_check, that the lists of gains fit the robot, and that a file of an actuator
  * has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);

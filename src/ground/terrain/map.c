@@ -15,17 +15,18 @@ const MildField mild_map_fields[] = {
     MILD_FIELD_CHOICE(MildMapDef, kind, kinds, COUNT(kinds), "[-] shape of the surface"),
     FIELD(cell, 0.001, 1.0, "[m] spacing of the height grid; with kind = image, of the pixels"),
     FIELD(size, 0.1, 1000.0,
-          "[m] rough, mixed: period after which the heights repeat; mixed: at least 10"),
+          "[m] rough, mixed, blocks: period after which the heights repeat; mixed: at least 10"),
     FIELD(amplitude, 0.0, 5.0,
           "[m] waves, rough: largest height above and below the mean; steps, image: total height; "
-          "mixed: most of either"),
+          "mixed: most of either; blocks: greatest height"),
     FIELD(wavelength, 0.02, 100.0,
           "[m] waves: wavelength; steps: length of one step up and one down; rough: spacing of the "
-          "random heights; mixed: all three"),
+          "random heights; mixed: all three; blocks: edge of a block"),
     FIELD(slope, -1.0, 1.0,
-          "[-] slope: rise per metre along x; mixed: steepest side of the pyramids"),
+          "[-] slope: rise per metre along x; mixed: steepest side of the pyramids; blocks: their "
+          "greatest height per metre from x = 0; 0: amplitude everywhere"),
     MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19,
-               "[-] rough, mixed: seed of the random numbers"),
+               "[-] rough, mixed, blocks: seed of the random numbers"),
     MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns),
                       "[-] pattern in which the materials are laid out"),
     FIELD(patch_size, 0.01, 1000.0,

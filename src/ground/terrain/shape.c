@@ -77,6 +77,17 @@ static double height_mixed(const MildMapDef *def, double x, double y) {
     return faded * (relief < 13.0 ? height_steps(def, x, y) : height_rough(def, x, y));
 }
 
+/* Block k of n has its middle at k size/n; from the last one on x is negative. */
+static double height_blocks(const MildMapDef *def, double x, double y) {
+    const int blocks = (int)fmax(1.0, round(def->size / def->wavelength));
+    const int i = grid_place(x / def->size * blocks + 0.5, blocks, 1).cell;
+    const int j = grid_place(y / def->size * blocks + 0.5, blocks, 1).cell;
+    const double from = (i < blocks - i ? i : blocks - i) * def->size / blocks;
+    const double bound = def->slope == 0.0 ? def->amplitude : fabs(def->slope) * from;
+    const double level = floor(1.5 * (1.0 + lattice_height(def->seed, i, j))); /* 0, 1 or 2 */
+    return 0.5 * fmin(bound, def->amplitude) * level;
+}
+
 static MildStatus shape_allocate(MildMap *map, double columns, double rows, double cell_x,
                                  double cell_y, int repeats, MildError *error) {
     if ((columns + 1.0) * (rows + 1.0) > MILD_MAP_POINTS_MAX) {
@@ -163,6 +174,7 @@ MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error) {
     case MILD_MAP_ROUGH: return shape_formula(map, def, def->size, 1, height_rough, error);
     case MILD_MAP_IMAGE: return shape_image(map, def, error);
     case MILD_MAP_MIXED: return shape_mixed(map, def, error);
+    case MILD_MAP_BLOCKS: return shape_formula(map, def, def->size, 1, height_blocks, error);
     }
     return MILD_OK;
 }

@@ -108,7 +108,7 @@ static const float *forward(GpuLearner *g, int rows) {
 
 void gpu_enqueue_act(GpuLearner *g, int t) {
     const Network *n = &g->network;
-    const int width = n->def.frames * n->def.observation;
+    const int width = policy_history(&n->def);
     for (int first = 0; first < g->envs; first += g->rows) {
         const int rows = g->envs - first < g->rows ? g->envs - first : g->rows;
         const size_t row = (size_t)t * (size_t)g->envs + (size_t)first;
@@ -162,14 +162,21 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
     const Network *n = &g->network;
     GpuChunk *c = &g->chunk;
     cudaStream_t stream = g->queue.stream;
-    gpu_gather(stream, c->rows, n->def.frames * n->def.observation, n->history, job->order,
-               g->batch.history, c->history);
+    gpu_gather(stream, c->rows, policy_history(&n->def), n->history, job->order, g->batch.history,
+               c->history);
     gpu_gather(stream, c->rows, n->def.critic_input, n->critic.layer[0].in, job->order,
                g->batch.critic, c->critic);
     if (c->mirrored > 0) {
-        const GpuImages images = {c->mirrored, n->def.frames,   n->def.observation,
-                                  n->history,  job->at,         job->order,
-                                  job->which,  g->mirror_index, g->mirror_sign};
+        const GpuImages images = {.images = c->mirrored,
+                                  .frames = n->def.frames,
+                                  .observation = n->def.observation,
+                                  .scan = n->def.scan,
+                                  .pitch = n->history,
+                                  .first = job->at,
+                                  .order = job->order,
+                                  .which = job->which,
+                                  .index = g->mirror_index,
+                                  .sign = g->mirror_sign};
         gpu_mirror_history(stream, images, g->batch.history,
                            gpu_array_from(c->history, (size_t)c->rows * (size_t)n->history));
     }
@@ -213,13 +220,13 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
     gpu_columns_add(&g->queue, pitch, slices, pitch, g->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)pitch;
-        const int observation = g->network.def.observation;
+        const int newest = g->network.newest;
         const GpuMirror m = {.actions = actions,
                              .pitch = pitch,
                              .first = job->at,
                              .which = job->which,
-                             .index = g->mirror_index + observation,
-                             .sign = g->mirror_sign + observation,
+                             .index = g->mirror_index + newest,
+                             .sign = g->mirror_sign + newest,
                              .weight = 2.0f * (float)def->mirror_weight * job->mirror_weight /
                                        (float)actions,
                              .mean = mean,

@@ -97,14 +97,15 @@ void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *
 template <class T>
 static __global__ void mirror_history(GpuImages m, const float *history, void *to) {
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)m.pitch / 4;
-    const int width = m.frames * m.observation;
+    const int before = (m.frames - 1) * m.observation, width = before + m.observation + m.scan;
     if (i >= (uint32_t)m.images * pitch) {
         return;
     }
     const float *row = history + (int64_t)m.order[m.which[i / pitch] - m.first] * width;
     Four<T> four;
     for (int k = 0; k < 4; k++) {
-        const int column = 4 * (int)(i % pitch) + k, own = column % m.observation;
+        const int column = 4 * (int)(i % pitch) + k;
+        const int own = column < before ? column % m.observation : column - before;
         number_write(&four.at[k],
                      column < width ? m.sign[own] * row[column - own + m.index[own]] : 0.0f);
     }
@@ -335,11 +336,11 @@ void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, int newest, GpuA
                history.at, heads, feet.at)
 }
 
-/* A number of the input [newest frame | estimates | theta1 z + theta2]. */
+/* A number of the input [newest frame | scan | estimates | theta1 z + theta2]. */
 template <class T>
 static __device__ float actor_number(const GpuWidths &w, const T *newest, const float *heads,
                                      const float *noise, const float *theta, int column) {
-    const int head = column - w.observation, j = head - w.estimates;
+    const int head = column - w.newest, j = head - w.estimates;
     if (head < 0) {
         return number_read(newest[column]);
     }
@@ -581,7 +582,7 @@ static __global__ void modulation_theta(GpuWidths w, uint32_t count, const float
             w.modulation
                 ? loss_modulation_theta(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
                                         noise ? noise + r * w.latent : NULL,
-                                        d_input + r * w.actor_input + w.observation, column)
+                                        d_input + r * w.actor_input + w.newest, column)
                 : 0.0f;
     }
 }
@@ -605,7 +606,7 @@ static __device__ float latent_backward(const GpuWidths &w, const GpuHeads &h, i
                 d_z = is_image ? 0.0f : h.d_decoder_input[r * w.decoder_input + j],
                 d_mu = loss_modulation_head(w.estimates, w.latent, w.per_dimension, heads, NULL,
                                             h.theta + r * w.theta,
-                                            h.d_input + r * w.actor_input + w.observation, at_mu);
+                                            h.d_input + r * w.actor_input + w.newest, at_mu);
     const float spread = loss_spread(logvar), twice = loss_latent_twice(mu, logvar, spread),
                 weight = is_image ? 0.0f : loss_kl_weight(h.latent_weight, h.free_bits, twice);
     d_heads[at_mu] = d_mu + loss_mu_gradient(weight, mu, d_z);
@@ -622,7 +623,7 @@ static __device__ float estimate_backward(const GpuWidths &w, const GpuHeads &h,
                 target = is_image ? 0.0f : h.target[(int64_t)sample * w.estimates + j],
                 d_feet = foot >= 0 && foot < w.feet_input ? h.d_feet[r * w.feet + foot] : 0.0f,
                 d_decoder = is_image ? 0.0f : h.d_decoder_input[r * w.decoder_input + w.latent + j];
-    float d = h.d_input[r * w.actor_input + w.observation + j] + d_feet + d_decoder;
+    float d = h.d_input[r * w.actor_input + w.newest + j] + d_feet + d_decoder;
     const float square = is_image ? 0.0f : loss_estimate(weight, estimate, target, &d);
     h.d_heads[i] = d;
     return square;

@@ -42,12 +42,12 @@ int gpu_blocks(int rows); /* rows of `sums` that passes over this many rows need
 void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
                 const float *from, GpuArray to);
 /* Row m of `to` is the mirror image of row order[which[m] - first] of the rollout's history, frame
- * by frame. */
+ * by frame; the scan goes with the last. */
 typedef struct {
-    int images, frames, observation, pitch, first;
+    int images, frames, observation, scan, pitch, first;
     const int *order;         /* samples of the chunk */
-    const int *which, *index; /* [images], [observation] */
-    const float *sign;        /* [observation] */
+    const int *which, *index; /* [images], [observation + scan] */
+    const float *sign;        /* [observation + scan] */
 } GpuImages;
 void gpu_mirror_history(cudaStream_t stream, GpuImages images, const float *history, GpuArray to);
 /* noise [rows][latent]: numbers row[r] * latent .. of the stream *key (noise.h). */
@@ -82,7 +82,7 @@ void gpu_round(cudaStream_t stream, int64_t count, const float *from, GpuArray t
 
 typedef struct {
     int modulation; /* bool: it learns */
-    int observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
+    int observation, newest, estimates, latent, per_dimension, feet_offset, feet_count, actions;
     int feet_input, clock_input; /* numbers of both kinds in the modulation's input */
     int decoded_frame, ground_offset, ground_count; /* of the decoder's target */
     int critic_input;                               /* from row to row in the rollout */

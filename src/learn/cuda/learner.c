@@ -72,6 +72,7 @@ static void set_sizes(GpuLearner *g, int envs) {
     const Network *n = &g->network;
     g->widths = (GpuWidths){.modulation = ppo->def.modulation,
                             .observation = def->observation,
+                            .newest = n->newest,
                             .estimates = def->estimates,
                             .latent = def->latent,
                             .per_dimension = def->modulation_per_dimension,
@@ -106,7 +107,7 @@ static size_t layout(GpuLearner *g, char *block) {
     const Network *n = &g->network;
     const size_t parameters = (size_t)n->count * sizeof(float),
                  samples = (size_t)g->ppo->batch.steps * (size_t)g->envs,
-                 mirror = (size_t)n->def.observation + (size_t)n->def.actions;
+                 mirror = (size_t)n->newest + (size_t)n->def.actions;
     size_t used = 0;
     float **const vectors[] = {&g->parameters, &g->gradient, &g->first, &g->second, &g->average};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
@@ -205,8 +206,8 @@ enum { CARRIED = 4 };
 static void carried(const Network *n, const PpoBatch *b, int t, float *at[CARRIED],
                     size_t bytes[CARRIED]) {
     float *const arrays[CARRIED] = {b->history, b->critic, b->target, b->frame};
-    const int widths[CARRIED] = {n->def.frames * n->def.observation, n->def.critic_input,
-                                 n->def.estimates, n->def.observation};
+    const int widths[CARRIED] = {policy_history(&n->def), n->def.critic_input, n->def.estimates,
+                                 n->def.observation};
     for (int i = 0; i < CARRIED; i++) {
         const size_t floats = (size_t)b->envs * (size_t)widths[i];
         at[i] = arrays[i] + (size_t)t * floats;
@@ -647,7 +648,7 @@ static MildStatus open_learner(GpuLearner *g, int resident, MildError *error) {
     cudaMemsetAsync(g->batch.valid, 1, samples, g->queue.stream);
     fill_rows(g);
     if (ppo->mirror.observation_index) {
-        const size_t count = (size_t)def->observation + (size_t)def->actions;
+        const size_t count = (size_t)policy_newest(def) + (size_t)def->actions;
         upload(g, g->mirror_index, ppo->mirror_index, count * sizeof(int));
         upload(g, g->mirror_sign, ppo->mirror_sign, count * sizeof(float));
     }

@@ -57,7 +57,7 @@ typedef struct {
     int *order;        /* [minibatch] samples of the present minibatch */
     int *latent_row;   /* [steps * envs] ppo_latent_rows of the minibatches, one after the other */
     int *which;        /* [steps * envs] ppo_mirrored, likewise */
-    int *mirror_index; /* [observation + actions] */
+    int *mirror_index; /* [newest + actions] */
     float *mirror_sign;
     double *sums;          /* [sum_blocks][GPU_SUMS] */
     double *partial;       /* [GPU_PARTS][GPU_MOMENTS] */

@@ -20,6 +20,12 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     if (!envs->robot) {
         return error->status;
     }
+    if (def->task.scan > 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "task.scan = %d: environments for other learners have no height scan; "
+                         "leave it out",
+                         def->task.scan);
+    }
     experiment_fit_robot(def, envs->robot);
     robot_set_model(envs->robot, task_model_soles(def->task.randomize.model));
     robot_set_shells(envs->robot, def->task.shells_stand);

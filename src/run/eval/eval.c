@@ -272,7 +272,8 @@ static void start_trial(void *context, int trial, int thread) {
 /* [observation] What the policy sees next. */
 static const float *newest_frame(const Trials *t, int trial) {
     const TaskShape shape = task_shape(&t->task, t->run->robot);
-    return t->host.history + (size_t)(trial + 1) * (size_t)shape.history - shape.observation;
+    return t->host.history + (size_t)(trial + 1) * (size_t)shape.history - shape.scan -
+           shape.observation;
 }
 
 /* after: the last physics step. */

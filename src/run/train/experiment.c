@@ -23,6 +23,7 @@ void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
     task_policy_keys_print(&def->task, def->policy.task, sizeof def->policy.task);
     def->policy.observation = shape.observation;
     def->policy.frames = TASK_FRAMES;
+    def->policy.scan = shape.scan;
     def->policy.critic_input = shape.critic;
     def->policy.actions = shape.actions;
     def->policy.estimates = shape.estimates;

@@ -62,6 +62,6 @@ const MildField train_fields[] = {
     MILD_FIELD(
         TrainDef, start, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->start, 0, 0,
         "[-] policy whose networks a new run begins with, but for a decoder of another shape "
-        "(ppo.decoder_target); empty: random ones"),
+        "(ppo.decoder_target) or without the scan that the run has; empty: random ones"),
 };
 const int train_field_count = sizeof train_fields / sizeof *train_fields;

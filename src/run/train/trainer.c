@@ -125,7 +125,7 @@ static EnvsView view_at(const Trainer *trainer, int t) {
     const PpoBatch *batch = ppo_batch(trainer->ppo);
     const size_t row = (size_t)t * (size_t)batch->envs;
     return (EnvsView){
-        .history = batch->history + row * (size_t)(policy->frames * policy->observation),
+        .history = batch->history + row * (size_t)policy_history(policy),
         .critic = batch->critic + row * (size_t)policy->critic_input,
         .estimate = batch->target + row * (size_t)policy->estimates,
         .frame = batch->frame + row * (size_t)policy->observation,
