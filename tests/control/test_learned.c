@@ -213,14 +213,15 @@ TEST(parts_are_taken_out) {
 
 /* Whose shape is not the task's is refused with both shapes named, and nothing is made. */
 TEST(another_shape_is_refused) {
-    static const char *const names[3] = {PATH " 46 6 sa01 47 12", PATH " 47 5 sa01 6 12",
-                                         PATH " 47 6 11 sa01 12"};
-    for (int wrong = 0; wrong < 3; wrong++) {
+    static const char *const names[4] = {PATH " 46 6 sa01 47 12", PATH " 47 5 sa01 6 12",
+                                         PATH " 47 6 11 sa01 12", PATH " 7 0 task.scan"};
+    for (int wrong = 0; wrong < 4; wrong++) {
         MildError error = {0};
         PolicyDef def = task_policy_def();
         def.observation -= wrong == 0;
         def.frames -= wrong == 1;
         def.actions -= wrong == 2;
+        def.scan = wrong == 3 ? 7 : 0;
         policy_destroy(save_policy(&def));
         Controller controller = {0};
         assert_int_equal(controller_learned(PATH, robot, NULL, 1, &controller, &error),

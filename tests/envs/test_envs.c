@@ -174,6 +174,7 @@ TEST(one_clear_line) {
         {NULL, "train.envs=0", MILD_ERROR_RANGE, "--train.envs=0 train.envs 0 1 524288"},
         {NULL, "train.robot=none", MILD_ERROR_ARGUMENT, "none"},
         {NULL, "train.device=gpu", MILD_ERROR_RANGE, "train.device gpu"},
+        {NULL, "task.scan=5", MILD_ERROR_ARGUMENT, "task.scan 5"},
         {"no/such.ini", "train.envs=4", MILD_ERROR_IO, "no/such.ini"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
