@@ -242,6 +242,13 @@ TEST(test_scan_begins_unseen) {
     assert_memory_equal(policy_parameters(again), policy_parameters(seeing),
                         (size_t)policy_parameter_count(again) * sizeof(float));
     policy_destroy(again);
+    assert_int_equal(policy_save(seeing, PATH, "", NULL), MILD_OK); /* a file has it */
+    again = policy_load(PATH, NULL, 0, NULL);
+    assert_true(again && policy_def(again)->scan == SCAN);
+    policy_act(again, NULL, 1, history, actions[0], NULL, NULL);
+    assert_memory_equal(actions[0], actions[1], sizeof actions[0]);
+    unlink(PATH);
+    policy_destroy(again);
     policy_destroy(seeing);
     policy_destroy(blind);
 }
