@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [run] [jump] [rise] [actuator] [motion] [patchwork]; without a name all. The drawings are scripts/drawings.py's.
+# [robots] [run] [jump] [steps] [rise] [actuator] [motion] [patchwork]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -108,6 +108,13 @@ jump() {
     still "$work/jump.mp4" docs/jump.png "select='eq(n,38)+eq(n,41)+eq(n,47)+eq(n,54)',crop=iw/2:ih:iw/4:0,scale=320:-1:flags=area,tile=4x1"
 }
 
+# The G1 climbs steps of loose sand: three moments.
+steps() {
+    "$mild" play --robot g1 --policy policies/g1_steps.safetensors --ground sand_loose --speed 0.5 --seconds 5 --terrain.kind=steps \
+        --terrain.wavelength=1.4 --terrain.amplitude=0.15 --video "$work/steps.mp4"
+    still "$work/steps.mp4" docs/steps.png "select='eq(n,53)+eq(n,66)+eq(n,79)',scale=480:-1:flags=area,tile=3x1"
+}
+
 # A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
@@ -134,9 +141,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | run | jump | rise | actuator | motion | patchwork) "$name" ;;
+    terrain | walk | robots | run | jump | steps | rise | actuator | motion | patchwork) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots run jump rise actuator motion patchwork; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots run jump rise actuator motion patchwork" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots run jump steps rise actuator motion patchwork; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots run jump steps rise actuator motion patchwork" >&2 && exit 2 ;;
     esac
 done
