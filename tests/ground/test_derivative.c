@@ -136,7 +136,7 @@ static int is_thrown(const Kit *kit) {
  * other, to which it is coupled and which strikes the ground: the sand's lag, which depends on the
  * speed at which the foot comes, follows the free motion. */
 TEST(derivatives_where_a_foot_is_thrown_up) {
-    const int count = problem_count ? problem_count : kit_draws(60);
+    const int count = kit_draws(60);
     MildMaterial m = kit_preset("sand_dense");
     Score scores[SCORES] = {{0}};
     int thrown = 0;
