@@ -393,7 +393,7 @@ static void column_difference(const Step *step, Move *move, int k, double *G) {
 
 /* dW by what `move` moves: [6 feet][6 feet]. */
 static __attribute__((cold)) int by_motion(Step *step, Move *move, double *to) {
-    Blocks G;
+    Blocks G = {0.0};
     for (int k = 0; k < 6; k++) {
         column_difference(step, move, k, G);
     }
@@ -558,7 +558,9 @@ static void derivative_clear(const MildContactDerivative *derivative, int feet) 
 static int blocks_of(Step *step, MildScratch *at, double *F) {
     int stops = 0;
     contact_hessian(at);
+    /* what vectors read beyond */
     memset(step->H + 6 * step->n, 0, sizeof(Vector));
+    memset(F + 6 * step->n, 0, sizeof(Vector));
     for (int k = 0; k < at->listed; k++, F += 36) {
         const int f = at->list[k];
         const FootScratch *foot = &at->foot[f];

@@ -105,7 +105,7 @@ void foot_free(const FootScratch *foot, const MildContactInput *input, int f, co
     LaneVector sums[36] = {{0.0}};
     double turned_round[36];
     for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        Lanes k, across, along;
+        _Alignas(LaneVector) Lanes k, across, along;
 #pragma omp simd
         for (int i = 0; i < SLOT_LANES; i++) {
             const Real inverse = 1 / (s->hzz[i] + REAL_LEAST);
