@@ -184,6 +184,7 @@ wheels: setup
 python-check: wheel
 	@$(call with_wheel,learners)
 	@build/learners-venv/bin/python tests/python/check_learners.py
+	@build/learners-venv/bin/python tests/python/test_gradients.py
 	@build/learners-venv/bin/python lab/paper/tests/test_learners.py .
 	@build/learners-venv/bin/python tests/python/check_cuda.py
 
@@ -202,6 +203,7 @@ isaaclab-check: wheel
 jax-check: wheel
 	@$(call with_wheel,jax)
 	@build/jax-venv/bin/python -W ignore tests/python/check_jax.py
+	@build/jax-venv/bin/python tests/python/test_gradients.py
 
 # The bridges of lab/drive.
 dds-check: build

@@ -25,7 +25,7 @@ endif()
 # Small, because every simulator loads it: -O2 for the loops that take most of a step, -Os for the rest.
 # No exception passes through C, so no tables to unwind it by. A section for each function and table: a program that links the
 # archive with -Wl,--gc-sections takes only what it calls.
-set(loops "locate|newton|newton_step|pass|solve|sweep")
+set(loops "derivative|locate|newton|newton_step|pass|solve|sweep")
 set(ground_base_sources) # what libmild has of the layer base (cmake/Library.cmake)
 foreach(name error field text)
   list(APPEND ground_base_sources ${CMAKE_CURRENT_SOURCE_DIR}/base/${name}.c)
@@ -45,3 +45,4 @@ endforeach()
 # solve.c, and for materials in mixture.c.
 set_property(SOURCE ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/pass.c ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/derivative_free.c
   APPEND PROPERTY COMPILE_OPTIONS -ffp-contract=fast -ffinite-math-only -fno-signed-zeros)
+set_property(SOURCE ${CMAKE_CURRENT_SOURCE_DIR}/ground/step/derivative.c APPEND PROPERTY COMPILE_OPTIONS -ffp-contract=fast)

@@ -148,6 +148,22 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
+/* The first step of feet that fall into ground without prints: all elements sink. */
+static void ground_falls(GroundBench *bench, const MildSole *const *soles, double dt,
+                         BenchReport *report) {
+    const double fall = 0.5; /* [m/s] */
+    mild_ground_reset(bench->ground);
+    ground_input(bench, soles, dt);
+    for (int foot = 0; foot < BENCH_FEET; foot++) {
+        bench->input.velocity[foot][2] -= fall;
+        bench->input.free_velocity[6 * foot + 2] -= fall;
+    }
+    bench_add(report, "ground", "newton_fall", ground_time(bench, 0), "ns");
+    bench->derives = 1;
+    bench_add(report, "ground", "newton_fall_derivative", ground_time(bench, 0), "ns");
+    bench->derives = 0;
+}
+
 /* A step of feet that slip, with its end. It begins with the same memory each time: where slip
  * takes the support away, a foot would soon carry nothing. */
 static MildStatus ground_slips(GroundBench *bench, const char *name, BenchReport *report,
@@ -235,6 +251,7 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
         if (model == MILD_MODEL_MILD) {
             ground_cases(&bench, robot, dt, report);
             status = ground_slips(&bench, "newton_slip_advance", report, error);
+            ground_falls(&bench, soles, dt, report);
             status = status ? status : ground_terrain(&bench, robot, dt, report, error);
             bench_add(report, "ground", "elements",
                       mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");

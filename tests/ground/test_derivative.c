@@ -118,6 +118,58 @@ TEST(derivatives_where_friction_turned) {
     expect_scores("turned round", scores, count / 200, (Score[SCORES]){{0}});
 }
 
+/* Bool: an element of foot 0, pressed, leaves faster than it came, after the free motion alone was to
+ * take it into virgin ground, faster. */
+static int is_thrown(const Kit *kit) {
+    const FootScratch *foot = &kit->scratch->foot[0];
+    int thrown = 0;
+    for (int slot = 0; slot < foot->active; slot++) {
+        const Slots *s = slot_block(foot, slot);
+        const int i = slot % SLOT_LANES;
+        thrown |= s->iz[i] > 0.0 && s->entry_speed[i] > -kit->input.velocity[0][2] + 1e-6 &&
+                  s->entry_speed[i] < kit->result.velocity[2];
+    }
+    return thrown;
+}
+
+/* A foot that has pressed elastic sand and comes down again is thrown up within the step by the
+ * other, to which it is coupled and which strikes the ground: the sand's lag, which depends on the
+ * speed at which the foot comes, follows the free motion. */
+TEST(derivatives_where_a_foot_is_thrown_up) {
+    const int count = kit_draws(60);
+    MildMaterial m = kit_preset("sand_dense");
+    Score scores[SCORES] = {{0}};
+    int thrown = 0;
+    uint64_t random = 5;
+    m.recovery = 0.9;
+    for (int n = 0; n < count; n++) {
+        Kit kit;
+        kit_open(&kit, 2, soles[5], soles[6], &m, 2e-3);
+        for (int s = 0; s < 4; s++) { /* down, and a little up */
+            kit.input.free_velocity[2] = s < 3 ? -0.5 : kit_uniform(&random, 0.02, 0.1);
+            kit.input.free_velocity[8] = -0.5;
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        kit.mass[0] = kit.mass[1] = 1.0;
+        kit_inverse_inertia(&kit);
+        for (int i = 0; i < 6; i++) {
+            kit.A[12 * i + 6 + i] = kit.A[12 * (6 + i) + i] = 0.9 * kit.A[13 * i];
+        }
+        kit.input.velocity[0][2] = kit_uniform(&random, -0.6, -0.3);
+        kit.input.velocity[1][2] = kit_uniform(&random, -4.0, -1.0);
+        kit_free(&kit, NULL);
+        kit_solve(&kit);
+        if (is_thrown(&kit) && kit.result.converged) {
+            thrown++;
+            compare(&kit, n, scores);
+        }
+        kit_close(&kit);
+    }
+    print_message("%d of %d\n", thrown, count);
+    expect_scores("thrown up", scores, count / 4, (Score[SCORES]){{0}});
+}
+
 /* Ground of negative added mass (passive = false) pushes feet that were about to leave it and are
  * pushed back, mostly by its explicit impulse, which follows their free motion alone. */
 TEST(derivatives_of_an_explicit_impulse) {

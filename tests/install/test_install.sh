@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 cc=${CC:-cc}
 flags=(-std=c17 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Werror)
-programs=(dropped_plate hopper two_link)
+programs=(dropped_plate hopper jump two_link)
 
 fail() {
     echo "FAIL: $*" >&2
@@ -177,6 +177,9 @@ check dropped_plate "rests at the depth of the law, carrying its weight" '
 check hopper "ten hops, clear of the ground, ever deeper prints" '
     $1 ~ /^[0-9]+$/ { hops++; if ($4 < 0.05 || $5 <= last || $5 > 50 || $6 < 33) bad = 1; last = $5 }
     END { exit !(hops == 10 && !bad) }'
+check jump "plans that reach their height, and do so on finer ground, but not plans for hard ground" '
+    $1 ~ /^[0-9]+$/ { n++; if ($2 > 10 || !near($3, $1, 0.002) || !near($4, $1, 0.03) || $5 > 0.7 * $1) bad = 1 }
+    END { exit !(n == 6 && !bad) }'
 check two_link "stands on its weight in the mean, tilts, sinks" '
     NR > 1 && $1 > 1.9 { n++; sum += $4; if ($3 > tilt) tilt = $3; if ($5 <= 0 || $5 > 60) bad = 1 }
     END { exit !(n == 9 && near(sum / n, 12 * 9.81, 0.03) && tilt > 0.05 && tilt < 0.3 && !bad) }'

@@ -96,6 +96,8 @@ TEST(a_row_measures_what_it_names) {
     expect_row(&report, "newton_stick", NEWTON);
     expect_row(&report, "newton_stick_advance", NEWTON + ADVANCE);
     expect_row(&report, "newton_stick_derivative", NEWTON + DERIVES);
+    expect_row(&report, "newton_fall", NEWTON);
+    expect_row(&report, "newton_fall_derivative", NEWTON + DERIVES);
     expect_row(&report, "newton_slip", NEWTON + SLIPS);
     expect_row(&report, "gauss_seidel_stick", SWEEPS);
     expect_row(&report, "gauss_seidel_slip", SWEEPS + SLIPS);
@@ -115,7 +117,7 @@ TEST(a_row_measures_what_it_names) {
     expect_row(&report, "newton_slip_sinkage_advance", sinks + ADVANCE);
     expect_row(&report, "newton_slip_sinkage_derivative", sinks + DERIVES);
     expect_row(&report, "newton_slip_sinkage_slip_advance", sinks + SLIPS + ADVANCE);
-    assert_int_equal(report.count, 14 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
+    assert_int_equal(report.count, 16 + 2 * (MILD_MODEL_RIGID - MILD_MODEL_MILD - 1));
 }
 
 /* Per element of both plates. */

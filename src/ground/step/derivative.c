@@ -12,7 +12,7 @@
  *
  * all of them blocks of a foot, the implicit function theorem says
  *
- *     (1 + H A) dP = (F - H) dV^ + G dx,   dV = dV^ + A dP
+ *     (1 + A H) dV = (1 + A F) dV^ + A G dx,   dP = F dV^ + G dx - H dV
  *
  * Nothing else is fixed during a solve: its bounds of friction are those of its own P when it
  * converges. Which elements have a reversal velocity (energy.c) is a branch, as sliding is; that
@@ -27,7 +27,7 @@
 /* Steps of the differences, at fixed twists. Lengths: above the rounding of a depth, 1e-17 m beside
  * the origin, and short, because the law has kinks. Speeds: above the same rounding over dt, and
  * short for the speed at which friction and the lag of elastic ground set in. */
-#define STEP_LENGTH 5e-9 /* [m] and as many times the distance from the origin */
+#define STEP_LENGTH 2e-9 /* [m] and as many times the distance from the origin */
 #define STEP_ANGLE 3e-8  /* [rad] */
 #define STEP_SPEED 3e-7  /* [m/s] */
 #define STEP_SPIN 3e-6   /* [rad/s] */
@@ -37,8 +37,8 @@
 
 #define STEP_GROWTH 8.0 /* [-] a larger elimination factor calls for a row exchange */
 
-/* A block for each foot. */
-typedef double Blocks[MILD_FEET_MAX][36];
+/* Six rows of six numbers for each listed foot, in their order, and what a vector reads beyond. */
+typedef double Blocks[36 * MILD_FEET_MAX + NEWTON_VECTOR];
 
 /* A step whose derivatives are wanted. Impulses and twists are those of all feet, in the world. */
 typedef struct {
@@ -48,10 +48,10 @@ typedef struct {
     MildScratch *scratch;
     MildScratch *work;   /* may be NULL */
     const double *twist; /* V [6 feet] */
-    Blocks H;            /* of the listed feet */
-    /* Equations of the listed feet, (1 + H A) X = R: n rows of `parts` vectors each, 1 + H A in the
-     * first `left` of them and R, later X, behind. */
-    int n, left, parts;
+    Blocks H;
+    /* Equations of the listed feet, (1 + A H) U = R: n rows, each of `left` vectors of 1 + A H,
+     * later of the impulses that U makes, and as many of R, later U. */
+    int n, left;
     Vector *rows;
 } Step;
 
@@ -151,23 +151,29 @@ static __attribute__((cold)) void law_at(const Step *step, const MildTerrain *te
 
 /* ---- the equations of all feet ---- */
 
-/* X of row i. */
-static inline double *solution(const Step *step, int i) {
-    return (double *)(step->rows + i * step->parts + step->left);
+/* A vector of numbers anywhere. */
+typedef double Loose __attribute__((vector_size(sizeof(Vector)), aligned(8), may_alias));
+typedef double Pair __attribute__((vector_size(2 * sizeof(double)), aligned(8), may_alias));
+enum { SIX = (6 + NEWTON_VECTOR - 1) / NEWTON_VECTOR }; /* vectors of six numbers */
+
+/* Row i of 1 + A H or of the impulses, and of R or U. */
+static inline double *row_left(const Step *step, int i) {
+    return (double *)(step->rows + 2 * i * step->left);
 }
 
-/* Row i of A for foot f, of the columns of the listed feet. */
-static inline void inertia_row(const Step *step, int f, int i, Row *row) {
-    const MildScratch *scratch = step->scratch;
-    const double *A =
-        step->input->inverse_inertia + (6 * scratch->place[f] + i) * 6 * scratch->given;
-    row->part[step->left - 1] = (Vector){0.0};
-    for (int m = 0; m < scratch->listed; m++) {
-        memcpy(row->at + 6 * m, A + 6 * scratch->place[scratch->list[m]], 6 * sizeof *A);
-    }
+static inline double *row_right(const Step *step, int i) {
+    return (double *)(step->rows + (2 * i + 1) * step->left);
 }
 
-/* Rows of a foot, `parts` vectors apart: rows -= factor pivot. Written out, as in newton_step.c. */
+/* x_0 row_0 + ... + x_5 row_5 of rows `width` numbers apart. Written out, as in newton_step.c. */
+static inline Vector six_times(const double *rows, int width, const double *x) {
+#define ROW(k) (*(const Loose *)(rows + (k)*width))
+    return x[0] * ROW(0) + x[1] * ROW(1) + x[2] * ROW(2) + x[3] * ROW(3) + x[4] * ROW(4) +
+           x[5] * ROW(5);
+#undef ROW
+}
+
+/* Rows of a foot, `parts` vectors apart: rows -= factor pivot. */
 static inline void six_less(Vector *rows, int parts, const double *factor, Vector pivot) {
     rows[0] -= factor[0] * pivot;
     rows[parts] -= factor[1] * pivot;
@@ -177,53 +183,45 @@ static inline void six_less(Vector *rows, int parts, const double *factor, Vecto
     rows[5 * parts] -= factor[5] * pivot;
 }
 
-/* x_0 rows_0 + ... + x_5 rows_5 */
-static inline Vector six_times(const Vector *rows, int parts, const double *x) {
-    return x[0] * rows[0] + x[1] * rows[parts] + x[2] * rows[2 * parts] + x[3] * rows[3 * parts] +
-           x[4] * rows[4 * parts] + x[5] * rows[5 * parts];
+/* Row i of A of foot f, of the columns of listed foot m. */
+static inline const double *inertia_row(const Step *step, int f, int i, int m) {
+    const MildScratch *scratch = step->scratch;
+    return step->input->inverse_inertia + (6 * scratch->place[f] + i) * 6 * scratch->given +
+           6 * scratch->place[scratch->list[m]];
 }
 
-/* Begins the equations for so many columns, at most n: 1 + H A, and R = 0. */
-static void equations_begin(Step *step, int columns) {
-    step->left = (step->n + NEWTON_VECTOR - 1) / NEWTON_VECTOR;
-    step->parts = step->left + (columns + NEWTON_VECTOR - 1) / NEWTON_VECTOR;
-    memset(step->rows, 0, (size_t)(step->n * step->parts) * sizeof *step->rows);
-    for (int k = 0; k < step->scratch->listed; k++) {
-        const int f = step->scratch->list[k];
-        Row A[6];
-        for (int l = 0; l < 6; l++) {
-            inertia_row(step, f, l, &A[l]);
-        }
-        for (int i = 0; i < 6; i++) {
-            const double *h = step->H[f] + 6 * i;
-            Vector *row = step->rows + (6 * k + i) * step->parts;
-            for (int p = 0; p < step->left; p++) {
-                row[p] = six_times(A[0].part + p, NEWTON_VECTORS, h);
+/* Row i of `one` + A B. Beyond its n numbers it writes two more. B: blocks; NULL: 0. */
+static void row_set(const Step *step, int i, const double *B, double one, double *row) {
+    ((Vector *)row)[step->left - 1] = (Vector){0.0};
+    for (int m = 0; 6 * m < step->n; m++) {
+        const double *A = inertia_row(step, step->scratch->list[i / 6], i % 6, m);
+        for (int p = 0; p < SIX * NEWTON_VECTOR; p += NEWTON_VECTOR) {
+            Vector sum = {0.0};
+            if (B) {
+                sum = six_times(B + 36 * m + p, 6, A);
             }
-            ((double *)row)[6 * k + i] += 1.0;
+            *(Loose *)(row + 6 * m + p) = sum;
         }
     }
+    row[i] += one;
 }
 
 /* Swaps row k with the one below it that has the largest number in column k. */
 static __attribute__((cold, noinline)) void rows_choose(const Step *step, int k) {
-    const int parts = step->parts;
-    const double *column = (const double *)step->rows + k;
-    const int stride = parts * NEWTON_VECTOR;
     int best = k;
     for (int i = k + 1; i < step->n; i++) {
-        best = fabs(column[i * stride]) > fabs(column[best * stride]) ? i : best;
+        best = fabs(row_left(step, i)[k]) > fabs(row_left(step, best)[k]) ? i : best;
     }
-    for (int p = 0; best != k && p < parts; p++) {
-        const Vector swapped = step->rows[k * parts + p];
-        step->rows[k * parts + p] = step->rows[best * parts + p];
-        step->rows[best * parts + p] = swapped;
+    for (int p = 0; best != k && p < 2 * step->left; p++) {
+        Vector *const from = step->rows + p, swapped = from[2 * k * step->left];
+        from[2 * k * step->left] = from[2 * best * step->left];
+        from[2 * best * step->left] = swapped;
     }
 }
 
 /* Column k of the rows. Returns whether one below row k has too large a number there. */
 static inline int column_take(const Step *step, int k, double *column) {
-    const int stride = step->parts * NEWTON_VECTOR;
+    const int stride = 2 * step->left * NEWTON_VECTOR;
     const double *from = (const double *)step->rows + k;
     int grown = 0;
     for (int i = 0; i < step->n; i++) {
@@ -236,20 +234,24 @@ static inline int column_take(const Step *step, int k, double *column) {
     return grown;
 }
 
-/* Solves the equations by Gauss-Jordan elimination. Returns false when they are singular. */
-static int equations_solve(const Step *step) {
-    const int n = step->n, parts = step->parts;
+/* Solves the equations by Gauss-Jordan elimination. unit: bool, R is 1. Returns false when they are
+ * singular. */
+static int equations_solve(const Step *step, int unit) {
+    const int n = step->n, parts = 2 * step->left;
     for (int k = 0; k < n; k++) {
         double factor[TWIST_MAX];
         if (column_take(step, k, factor)) {
             rows_choose(step, k);
             column_take(step, k, factor);
+            unit = 0;
         }
         if (!(fabs(factor[k]) > 0.0)) {
             return 0;
         }
         const double inverse = 1.0 / factor[k];
-        for (int p = k / NEWTON_VECTOR; p < parts; p++) {
+        /* R, if 1 at first, is still 0 in the columns beyond k */
+        const int first = k / NEWTON_VECTOR, end = unit ? step->left + first + 1 : parts;
+        for (int p = first; p < end; p++) {
             const Vector scaled = inverse * step->rows[k * parts + p];
             for (int i = 0; i < n; i += 6) {
                 six_less(step->rows + i * parts + p, parts, factor + i, scaled);
@@ -260,52 +262,76 @@ static int equations_solve(const Step *step) {
     return 1;
 }
 
-/* X of the equations whose R are blocks of the feet. */
-static int blocks_solve(Step *step, Blocks blocks) {
-    equations_begin(step, step->n);
-    for (int i = 0; i < step->n; i++) {
-        memcpy(solution(step, i) + i / 6 * 6, blocks[step->scratch->list[i / 6]] + 6 * (i % 6),
-               6 * sizeof(double));
+/* U of R = `one` + A B, and P = B - H U. B: blocks; NULL: 0. Returns false when there is none. */
+static int blocks_solve(Step *step, const double *B, double one) {
+    for (int i = 0; i < step->n; i++) { /* in this order, because of what is beyond a row */
+        row_set(step, i, step->H, 1.0, row_left(step, i));
+        row_set(step, i, B, one, row_right(step, i));
     }
-    return equations_solve(step);
-}
-
-/* Adds a multiple of a row of X to that of a matrix [6 feet][6 feet]. */
-static inline void row_add(const Step *step, double times, const double *X, double *row) {
-    for (int m = 0; m < step->scratch->listed; m++) {
-        double *to = row + 6 * step->scratch->list[m];
-        for (int j = 0; j < 6; j++) {
-            to[j] += times * X[6 * m + j];
+    const int solved = equations_solve(step, !B);
+    for (int i = 0; i < step->n; i++) {
+        const int foot = i / 6 * 6;
+        double *row = row_left(step, i);
+        for (int p = 0; p < step->left * NEWTON_VECTOR; p += NEWTON_VECTOR) {
+            *(Vector *)(row + p) = -six_times(row_right(step, foot) + p,
+                                              2 * step->left * NEWTON_VECTOR, step->H + 6 * i);
+        }
+        for (int j = 0; B && j < 6; j++) {
+            row[foot + j] += B[6 * i + j];
         }
     }
+    return solved;
 }
 
-/* Adds X/dt of blocks_solve to a matrix [6 feet][6 feet]. */
-static void wrenches_add(const Step *step, double *to) {
+/* Row i of the listed feet among those of all feet. */
+static inline int row_of(const Step *step, int i) {
+    return 6 * step->scratch->list[i / 6] + i % 6;
+}
+
+/* A row of numbers of the listed feet times `times`, to one of a matrix [6 feet][6 feet]. */
+static inline void row_give(const Step *step, double times, const double *from, double *row) {
+    for (int m = 0; 6 * m < step->n; m++) {
+        Pair *const to = (Pair *)(row + 6 * step->scratch->list[m]);
+        const Pair *const numbers = (const Pair *)(from + 6 * m);
+        to[0] = times * numbers[0];
+        to[1] = times * numbers[1];
+        to[2] = times * numbers[2];
+    }
+}
+
+/* P/dt of blocks_solve, to a matrix [6 feet][6 feet]. */
+static void wrenches_give(const Step *step, double *to) {
     const int all = 6 * step->scratch->feet;
     for (int i = 0; to && i < step->n; i++) {
-        const int row = 6 * step->scratch->list[i / 6] + i % 6;
-        row_add(step, 1.0 / step->input->dt, solution(step, i), to + row * all);
+        row_give(step, 1.0 / step->input->dt, row_left(step, i), to + row_of(step, i) * all);
     }
 }
 
-/* The same of A X. */
-static void twists_add(const Step *step, double *to) {
-    const int all = 6 * step->scratch->feet, parts = step->parts - step->left;
-    for (int i = 0; to && i < all; i++) {
-        if (step->scratch->place[i / 6] < 0) {
+/* A P, to the rows of the feet that touch nothing. */
+static __attribute__((cold, noinline)) void others_give(const Step *step, double *to) {
+    const MildScratch *scratch = step->scratch;
+    const int all = 6 * scratch->feet;
+    for (int i = 0; i < all * step->n; i++) {
+        const int row = i / step->n, column = i % step->n;
+        double sum = 0.0;
+        if (scratch->place[row / 6] < 0 || scratch->foot[row / 6].active > 0) {
             continue;
         }
-        Row A, sum;
-        inertia_row(step, i / 6, i % 6, &A);
-        for (int p = 0; p < parts; p++) {
-            const Vector *X = step->rows + step->left + p;
-            sum.part[p] = (Vector){0.0};
-            for (int k = 0; k < step->n; k += 6) {
-                sum.part[p] += six_times(X + k * step->parts, step->parts, A.at + k);
-            }
+        for (int j = 0; j < step->n; j++) {
+            sum += inertia_row(step, row / 6, row % 6, j / 6)[j % 6] * row_left(step, j)[column];
         }
-        row_add(step, 1.0, sum.at, to + i * all);
+        to[row * all + row_of(step, column)] = sum;
+    }
+}
+
+/* dV/dV^ of blocks_solve, to a matrix [6 feet][6 feet]. */
+static void twists_give(const Step *step, double *to) {
+    const int all = 6 * step->scratch->feet;
+    for (int i = 0; to && i < step->n; i++) {
+        row_give(step, 1.0, row_right(step, i), to + row_of(step, i) * all);
+    }
+    if (to && step->n < all) {
+        others_give(step, to);
     }
 }
 
@@ -351,7 +377,7 @@ typedef void Move(MildContactInput *input, int k, double side, double *at);
 
 /* G, column k, of all feet: a foot's impulses at fixed twists depend on its own motion alone, so
  * all are moved at once. */
-static void column_difference(const Step *step, Move *move, int k, Blocks G) {
+static void column_difference(const Step *step, Move *move, int k, double *G) {
     double low[TWIST_MAX], high[TWIST_MAX], from[MILD_FEET_MAX] = {0}, at[MILD_FEET_MAX] = {0};
     MildContactInput moved = *step->input;
     move(&moved, k, -1.0, from);
@@ -359,20 +385,20 @@ static void column_difference(const Step *step, Move *move, int k, Blocks G) {
     moved = *step->input;
     move(&moved, k, 1.0, at);
     law_at(step, step->terrain, &moved, high);
-    for (int i = 0; i < 6 * moved.feet; i++) {
-        const int f = i / 6;
-        G[f][i % 6 * 6 + k] = (high[i] - low[i]) / (at[f] - from[f]);
+    for (int i = 0; i < step->n; i++) {
+        const int row = row_of(step, i);
+        G[6 * i + k] = (high[row] - low[row]) / (at[row / 6] - from[row / 6]);
     }
 }
 
-/* Adds dW by what `move` moves: [6 feet][6 feet]. */
+/* dW by what `move` moves: [6 feet][6 feet]. */
 static __attribute__((cold)) int by_motion(Step *step, Move *move, double *to) {
-    Blocks G;
+    Blocks G = {0.0};
     for (int k = 0; k < 6; k++) {
         column_difference(step, move, k, G);
     }
-    const int solved = blocks_solve(step, G);
-    wrenches_add(step, to);
+    const int solved = blocks_solve(step, G, 0.0);
+    wrenches_give(step, to);
     return solved;
 }
 
@@ -383,17 +409,18 @@ static int switches_off(const MildField *field, double value) {
                             field->offset == offsetof(MildMaterial, plate_width));
 }
 
-/* G of a field of a material, [6 feet]: a central difference, or at an end of the field's range one
- * of three points to the inside, of the same order. */
-static void field_difference(const Step *step, int material, const MildField *field,
-                             double *impulse) {
+/* G of a field of a material, column k of the blocks: a central difference, or at an end of the
+ * field's range one of three points to the inside, of the same order. */
+static void field_difference(const Step *step, int material, const MildField *field, int k,
+                             double *G) {
     static const double weights[2][3] = {{-0.5, 0.0, 0.5}, {-1.5, 2.0, -0.5}};
-    const int rows = 6 * step->input->feet;
     MildTerrain terrain = *step->terrain;
     char *const at = (char *)&terrain.materials[material] + field->offset;
     double value, own[TWIST_MAX];
     memcpy(&value, at, sizeof value);
-    memset(impulse, 0, (size_t)rows * sizeof *impulse);
+    for (int i = 0; i < step->n; i++) {
+        G[6 * i + k] = 0.0;
+    }
     if (!isfinite(value) || switches_off(field, value)) {
         return;
     }
@@ -406,28 +433,32 @@ static void field_difference(const Step *step, int material, const MildField *fi
         const double moved = value + (low | high ? j : j - 1) * h;
         memcpy(at, &moved, sizeof moved);
         law_at(step, &terrain, step->input, own);
-        for (int i = 0; i < rows; i++) {
-            impulse[i] += weight * own[i];
+        for (int i = 0; i < step->n; i++) {
+            G[6 * i + k] += weight * own[row_of(step, i)];
         }
     }
 }
 
+/* dW by fields of a material, six at a time: each foot has a column of its own for a field. */
 static __attribute__((cold)) int by_material(Step *step, const MildContactDerivative *derivative) {
     const int columns = derivative->field_count;
     int solved = 1;
-    for (int c = 0; c < columns; c++) {
-        double impulse[TWIST_MAX];
-        field_difference(step, derivative->material, &mild_material_fields[derivative->field[c]],
-                         impulse);
-        equations_begin(step, 1);
-        for (int i = 0; i < step->n; i++) {
-            *solution(step, i) = impulse[6 * step->scratch->list[i / 6] + i % 6];
+    for (int c = 0; c < columns; c += 6) {
+        Blocks G = {0.0};
+        for (int k = 0; k < 6 && c + k < columns; k++) {
+            field_difference(step, derivative->material,
+                             &mild_material_fields[derivative->field[c + k]], k, G);
         }
-        solved &= equations_solve(step);
-        for (int i = 0; i < step->n; i++) {
-            const int row = 6 * step->scratch->list[i / 6] + i % 6;
-            derivative->wrench_by_material[row * columns + c] =
-                *solution(step, i) / step->input->dt;
+        solved &= blocks_solve(step, G, 0.0);
+        for (int i = 0; i < 6 * step->n; i++) {
+            double sum = 0.0;
+            for (int column = i % 6; column < step->n; column += 6) {
+                sum += row_left(step, i / 6)[column];
+            }
+            if (c + i % 6 < columns) {
+                derivative->wrench_by_material[row_of(step, i / 6) * columns + c + i % 6] =
+                    sum / step->input->dt;
+            }
         }
     }
     return solved;
@@ -522,38 +553,34 @@ static void derivative_clear(const MildContactDerivative *derivative, int feet) 
     }
 }
 
-/* H and F - H of every listed foot, world. at: the scratch that holds the passes. */
-static void blocks_of(Step *step, MildScratch *at, Blocks moves) {
-    int creates = 0;
-    for (int m = 0; m < step->terrain->material_count; m++) {
-        creates |= !step->terrain->materials[m].passive;
-    }
+/* H and F of every listed foot, world. at: the scratch that holds the passes. Returns whether an F
+ * may not be 0. */
+static int blocks_of(Step *step, MildScratch *at, double *F) {
+    int stops = 0;
     contact_hessian(at);
-    for (int k = 0; k < at->listed; k++) {
+    /* what vectors read beyond */
+    memset(step->H + 6 * step->n, 0, sizeof(Vector));
+    memset(F + 6 * step->n, 0, sizeof(Vector));
+    for (int k = 0; k < at->listed; k++, F += 36) {
         const int f = at->list[k];
         const FootScratch *foot = &at->foot[f];
-        double *const H = step->H[f], *const move = moves[f], direct[36];
-        memcpy(H, at->hessian[f], sizeof step->H[f]);
+        double *const H = step->H + 36 * k;
+        memcpy(H, at->hessian[f], sizeof at->hessian[f]);
         block_to_world(foot, H);
-        for (int i = 0; i < 36; i++) {
-            move[i] = -H[i];
-        }
-        if (!foot->stops) {
-            continue;
-        }
-        foot_free(foot, step->input, f, step->twist + 6 * f, creates, direct);
-        block_to_world(foot, direct);
-        for (int i = 0; i < 36; i++) {
-            move[i] -= direct[i];
+        memset(F, 0, sizeof at->hessian[f]);
+        if (foot->stops) {
+            stops = 1;
+            foot_free(foot, step->input, f, step->twist + 6 * f, F);
+            block_to_world(foot, F);
         }
     }
+    return stops;
 }
 
 /* dW/dV of each foot. */
 static void law_slopes(const Step *step, double *to) {
     for (int i = 0; to && i < 6 * step->n; i++) {
-        const int f = step->scratch->list[i / 36];
-        to[36 * f + i % 36] = -step->H[f][i % 36] / step->input->dt;
+        to[6 * row_of(step, i / 6) + i % 6] = -step->H[i] / step->input->dt;
     }
 }
 
@@ -566,7 +593,7 @@ MildStatus mild_ground_derivative(const MildGround *ground, const MildTerrain *t
     if (status != MILD_OK) {
         return status;
     }
-    Blocks moves;
+    Blocks F;
     Step step;
     step.ground = ground;
     step.terrain = terrain;
@@ -575,8 +602,11 @@ MildStatus mild_ground_derivative(const MildGround *ground, const MildTerrain *t
     step.work = derivative->work;
     step.twist = result->velocity;
     step.n = 6 * scratch->listed;
+    step.left = (step.n + NEWTON_VECTOR - 1) / NEWTON_VECTOR;
     step.rows = (Vector *)scratch->rows;
-    derivative_clear(derivative, scratch->feet);
+    if (scratch->listed < scratch->feet) { /* else all is written */
+        derivative_clear(derivative, scratch->feet);
+    }
     if (scratch->listed == 0) {
         return MILD_OK;
     }
@@ -586,13 +616,13 @@ MildStatus mild_ground_derivative(const MildGround *ground, const MildTerrain *t
         law_at(&step, terrain, input, impulse);
         at = step.work;
     }
-    blocks_of(&step, at, moves);
+    const int direct = blocks_of(&step, at, F);
     law_slopes(&step, derivative->law);
     int solved = 1;
     if (derivative->wrench_by_free || derivative->velocity_by_free) {
-        solved &= blocks_solve(&step, moves);
-        wrenches_add(&step, derivative->wrench_by_free);
-        twists_add(&step, derivative->velocity_by_free);
+        solved &= blocks_solve(&step, direct ? F : NULL, 1.0);
+        wrenches_give(&step, derivative->wrench_by_free);
+        twists_give(&step, derivative->velocity_by_free);
     }
     if (is_differenced(derivative)) {
         solved &= differenced(&step, derivative);

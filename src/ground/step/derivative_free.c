@@ -7,58 +7,53 @@
 #include "ground/law/impulse.h"
 #include "ground/step/step.h"
 
+#define FREE_RAISED 1e-12 /* [m/s] least rise of the entry speed, above its rounding */
+
+enum { FREE_CURVES = LAW_CONE | LAW_HEAP }; /* those of ground with drag */
+
 /* [kg] Derivative of an element's normal impulse with respect to the downward speed of the free
- * motion, at the new downward speed `speed`. rate: 1/dt. before, free: its downward speed before
- * the step, and of the free motion. With h the entry speed, D the coefficient of the growth r,
+ * motion, at the new downward speed `speed`. rate: 1/dt. before: its downward speed before the
+ * step. With h the entry speed, D the coefficient of the growth r,
  *
- *     dh/dfree = (a - m0)/(dt h)                       where the free motion speeds it up
+ *     dh/dfree = (a - m0)/(dt h)                       where the free motion has raised h
  *     dD/dh    = entry_drag + s' (h - w)^2 + 2 s (h - w),   s = extra (stop - 1/2)/h
  *     dI/dfree = (r dD/dh + dlag/dh) dh/dfree + min(m_a, 0)
  *
  * (element_drag, growth_impulse, lag_impulse, element_explicit). */
-MILD_HD double element_free(const Element *e, int curves, double dt, double rate, double speed,
-                            double before, double free, int creates) {
+MILD_HD double element_free(const Element *e, double dt, double rate, double speed, double before) {
     const double h = e->entry_speed, a = e->yield_depth;
-    const double extra = real_max(2 * e->entry_drag, 0);
-    const double ahead = e->depth + dt / 2 * real_max((Real)before, 0) - a - ELEMENT_ELASTIC;
-    const int drags = (extra > 0.0) & (ahead > 0.0) & (free > before) & (h > 0.0);
     const double inverse = 1 / (h + ELEMENT_TINY);
-    const double raised = drags ? real_max((Real)(a - e->middle), 0) * rate * inverse : 0.0;
+    const double way = real_max((Real)(a - e->middle), 0) * rate * inverse;
+    const double raised = h - real_max((Real)before, 0) > FREE_RAISED ? way : 0.0;
 
-    const PowerWay none = {0, 0};
-    const double way = real_max((Real)(e->depth + dt / 2 * speed - a), 0);
-    const LawWay virgin = law_way(&e->law, curves, e->virgin_depth, (Real)way, &none);
-    const double grown = real_max(virgin.recruited, real_min(2 * virgin.recruited, e->stop_growth));
+    const double end = e->virgin_depth + real_max((Real)(e->depth + dt / 2 * speed - a), 0);
+    const double moved = law_moved(&e->law, FREE_CURVES, e->virgin_depth);
+    const double grown = law_moved(&e->law, FREE_CURVES, (Real)end) - moved;
+    const double counts = real_max(grown, real_min(2 * grown, e->stop_growth));
     const double lost = real_max((Real)(h - real_max((Real)speed, 0)), 0);
     /* s falls with 1/h, and by the part of `stop` that does, unless that is at its most */
-    const double s = e->stop_drag;
-    const int falls = s * h < extra * (BEGIN_STOP_MOST - 0.5 - 1e-9);
-    const double part = falls ? extra * (BEGIN_STOP - 0.5) * inverse - s : 0.0;
-    const double stop_drag_slope = (part - s) * inverse;
-    const double drag_slope = e->entry_drag + stop_drag_slope * lost * lost + 2 * s * lost;
+    const double extra = real_max(2 * e->entry_drag, 0), s = e->stop_drag;
+    const double part = extra * (BEGIN_STOP - 0.5) * inverse - s;
+    const double falls = s * h < extra * (BEGIN_STOP_MOST - 0.5 - 1e-9) ? part : 0.0;
+    const double drag_slope = e->entry_drag + ((falls - s) * inverse * lost + 2 * s) * lost;
     const double lag = lag_impulse(e, (Real)dt, (Real)speed).slope;
 
-    const double mass = real_min(e->law.mass_rate * law_moved(&e->law, curves, (Real)a), 0);
-    return (creates ? mass : 0.0) + (grown * drag_slope + lag) * raised;
+    const double mass = real_min(e->law.mass_rate, 0) * moved; /* b = a where there is mass */
+    return (counts * drag_slope + lag) * raised + (e->explicit_impulse != 0 ? mass : 0.0);
 }
 
 /* Twists of a foot, its elements' speeds of which foot_free needs. */
 typedef struct {
     Motion now;   /* before the step */
-    Motion free;  /* of the free motion */
     Motion after; /* of the solution */
 } Motions;
 
-/* element_free of a slot. */
-MILD_HD double slot_free(const Slots *s, int i, double dt, double rate, const Motions *m,
-                         int curves, int creates) {
+/* element_free of a slot, 0 where nothing presses. */
+MILD_HD double slot_free(const Slots *s, int i, double dt, double rate, const Motions *m) {
     const int kind = SLOT_UNEVEN | SLOT_SHELL;
-    const Element e = slot_loaded(s, i, curves);
-    const int explicit = creates & (s->depth[i] > 0) & !(s->middle[i] < s->depth_max[i]);
-    const double slope =
-        element_free(&e, curves, dt, rate, slot_velocity(s, i, &m->after, kind).descent,
-                     slot_velocity(s, i, &m->now, kind).descent,
-                     slot_velocity(s, i, &m->free, kind).descent, explicit);
+    const Element e = slot_loaded(s, i, FREE_CURVES);
+    const double slope = element_free(&e, dt, rate, slot_velocity(s, i, &m->after, kind).descent,
+                                      slot_velocity(s, i, &m->now, kind).descent);
     return s->iz[i] > 0 ? slope : 0.0;
 }
 
@@ -71,9 +66,14 @@ static inline void lanes_wrench(const LaneVector p[3], const LaneVector c[3], La
     }
 }
 
-/* Adds k (B^T c) (B^T g)^T of a block of slots, whose c are (across, along, 1). */
-static void block_add(const FootScratch *foot, const Slots *s, const Lanes k, const Lanes across,
-                      const Lanes along, LaneVector sums[36]) {
+/* Columns of a block that may not be 0: on level ground those of moving up and of the tilts. */
+typedef struct {
+    int first, end;
+} Columns;
+
+/* Adds k (B^T c) (B^T g)^T of a block of slots, whose c are (across, along, 1), by columns. */
+static void block_add(const FootScratch *foot, const Slots *s, Columns columns, const Lanes k,
+                      const Lanes across, const Lanes along, LaneVector sums[36]) {
     const LaneVector x = lanes_load(s->x), y = lanes_load(s->y), z = lanes_load(s->z);
     const LaneVector one = x * 0 + 1;
     const LaneVector g[3] = {-lanes_load(s->slope_x), -lanes_load(s->slope_y), one};
@@ -85,40 +85,39 @@ static void block_add(const FootScratch *foot, const Slots *s, const Lanes k, co
     }
     lanes_wrench(p, g, from);
     lanes_wrench(p, c, to);
-    for (int r = 0; r < 6; r++) {
-        const LaneVector row = lanes_load(k) * to[r];
-        for (int l = 0; l < 6; l++) {
-            sums[6 * r + l] += row * from[l];
+    for (int l = columns.first; l < columns.end; l++) {
+        const LaneVector column = lanes_load(k) * from[l];
+#pragma GCC unroll 6
+        for (int r = 0; r < 6; r++) {
+            sums[6 * l + r] += column * to[r];
         }
     }
-}
-
-MILD_HD void foot_free_of(const FootScratch *foot, double dt, const Motions *moves, int curves,
-                          int creates, double block[36]) {
-    const Motions m = *moves;
-    const double rate = 1 / dt;
-    LaneVector sums[36] = {{0.0}};
-    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
-        Lanes k, across, along;
-#pragma omp simd
-        for (int i = 0; i < SLOT_LANES; i++) {
-            const Real inverse = 1 / (s->hzz[i] + REAL_LEAST);
-            k[i] = (Real)slot_free(s, i, dt, rate, &m, curves, creates);
-            across[i] = s->hxz[i] * inverse; /* h has the column dI_z/dw c, above 0 where I_z is */
-            along[i] = s->hyz[i] * inverse;
-        }
-        block_add(foot, s, k, across, along, sums);
-    }
-    lanes_sum((const Lanes *)sums, 36, block);
 }
 
 void foot_free(const FootScratch *foot, const MildContactInput *input, int f, const double *twist,
-               int creates, double block[36]) {
-    double before[6], fell[6], turned[6];
+               double block[36]) {
+    double before[6], turned[6];
     twist_of_world(foot, input->velocity[f], before);
-    twist_of_world(foot, input->free_velocity + 6 * f, fell);
     twist_of_world(foot, twist, turned);
-    const Motions moves = {foot_motion(foot, before), foot_motion(foot, fell),
-                           foot_motion(foot, turned)};
-    foot_free_of(foot, input->dt, &moves, LAW_CONE | LAW_HEAP, creates, block);
+    const Motions m = {foot_motion(foot, before), foot_motion(foot, turned)};
+    const double dt = input->dt, rate = 1 / dt;
+    const Columns columns = {foot->uneven ? 0 : 2, foot->uneven ? 6 : 5};
+    LaneVector sums[36] = {{0.0}};
+    double turned_round[36];
+    for (const Slots *s = foot->slot, *end = slots_end(foot); s < end; s++) {
+        _Alignas(LaneVector) Lanes k, across, along;
+#pragma omp simd
+        for (int i = 0; i < SLOT_LANES; i++) {
+            const Real inverse = 1 / (s->hzz[i] + REAL_LEAST);
+            k[i] = -(Real)slot_free(s, i, dt, rate, &m);
+            across[i] = s->hxz[i] * inverse; /* h has the column dI_z/dw c, above 0 where I_z is */
+            along[i] = s->hyz[i] * inverse;
+        }
+        block_add(foot, s, columns, k, across, along, sums);
+    }
+    lanes_sum((const Lanes *)sums + 6 * columns.first, 6 * (columns.end - columns.first),
+              turned_round);
+    for (int i = 6 * columns.first; i < 6 * columns.end; i++) {
+        block[i % 6 * 6 + i / 6] = turned_round[i - 6 * columns.first];
+    }
 }
