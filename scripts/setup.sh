@@ -60,7 +60,8 @@ fi
 
 # The private environment holds the MuJoCo wheel (library and headers), matplotlib (figures), and what the Python package
 # is built and tested with. The copy of the requirements inside it is written last, so that an interrupted installation is repeated.
-if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
+pinned() { sed '/^ *#/d' "$1" 2>/dev/null; } # without remarks, which change nothing that is installed
+if ! cmp -s <(pinned scripts/requirements.txt) <(pinned .venv/requirements.installed); then
     python=/usr/bin/python3
     [ -x "$python" ] || python=python3
     "$python" -m venv --clear .venv # from nothing: two MuJoCo wheels side by side would be ambiguous
