@@ -38,10 +38,26 @@ set(batch_kernels
   "4 4 flat   any    8"
   "4 8 flat   any    8")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
+# mild_unit(UNIT INCLUDED NAME=VALUE...): writes a unit of INCLUDED with these macros.
+function(mild_unit unit included)
+  list(TRANSFORM ARGN REPLACE "(.*)=(.*)" "#define \\1 \\2")
+  list(JOIN ARGN "\n" macros)
+  file(CONFIGURE OUTPUT ${unit} CONTENT "@macros@\n#include \"@included@\"\n" @ONLY)
+endfunction()
 mild_layer(ground/batch layer_ground layer_device)
 # lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile, and with sanitizers nothing from -O1
 set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<IF:${mild_sanitized},-O0,-O2>")
-set_source_files_properties(ground/batch/host.c ground/batch/host_map.c PROPERTIES COMPILE_OPTIONS "$<${mild_sanitized}:-O0>")
+# The step of one robot on the CPU, a unit for each version of contact.inc, since they take long to compile.
+set(host_units "")
+foreach(version "feet 0 0" "feet_map 1 0" "points 0 1" "points_map 1 1")
+  separate_arguments(version UNIX_COMMAND ${version})
+  list(POP_FRONT version name map points)
+  list(APPEND host_units ${generated}/host_${name}.c)
+  mild_unit(${generated}/host_${name}.c ground/batch/host.inc
+    MILD_REAL_FLOAT=1 HOST_ROBOT=host_${name} CONTACT_MAP=${map} CONTACT_POINTS=${points})
+endforeach()
+target_sources(layer_batch PRIVATE ${host_units})
+set_source_files_properties(${host_units} PROPERTIES COMPILE_OPTIONS "$<${mild_sanitized}:-O0>")
 target_include_directories(layer_batch PUBLIC ${generated})
 
 # contact_shapes.h: lists of the sizes. The CPU has one step for all of them (host.inc)

@@ -37,8 +37,8 @@ typedef struct {
 } ContactCase;
 
 /* Solves and advances, on level ground and on a map. */
-void contact_case_double(ContactCase *c);
-void contact_case_float(ContactCase *c);
+void contact_level_double(ContactCase *c);
+void contact_level_float(ContactCase *c);
 void contact_map_double(ContactCase *c);
 void contact_map_float(ContactCase *c);
 

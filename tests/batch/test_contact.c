@@ -487,7 +487,7 @@ TEST(double_text_is_the_ground) {
         worst = (Worst){0};
         begins = i < PLACES ? 0 : CONTACT_BEGINS;
         run_place(place, kit_draws(8), begins ? 1e-12 : 1e-11,
-                  place->kind == LEVEL ? contact_case_double : contact_map_double, &worst);
+                  place->kind == LEVEL ? contact_level_double : contact_map_double, &worst);
         worst_print(place->name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
@@ -503,7 +503,7 @@ TEST(float_text_is_near_it) {
         static Worst worst;
         worst = (Worst){0};
         run_place(place, kit_draws(8), 1e-4,
-                  place->kind == LEVEL ? contact_case_float : contact_map_float, &worst);
+                  place->kind == LEVEL ? contact_level_float : contact_map_float, &worst);
         worst_print(place->name, &worst);
         assert_true(quantile(worst.force, worst.steps, 0.5) < (place->exact ? 3e-6 : 1e-5));
         assert_true(usual_worst(&worst) < 1e-3);
@@ -537,7 +537,7 @@ TEST(float_text_solves_feet_that_are_held) {
                 kit.input.free_velocity[k] += kit.input.dt * torque / kit.inertia[0];
             }
             case_of(&c, &kit, 1, 3, 1e-5);
-            contact_case_float(&c);
+            contact_level_float(&c);
             unsolved += !(c.residual <= c.tolerance);
             steps++;
             kit_solve(&kit);

@@ -1,2 +1,0 @@
-#define ENGINE_TEXT engine_text_double
-#include "engine_text.inc"
