@@ -43,8 +43,8 @@ MILD_API_BEGIN
  * models") ----
  * A model defines where the elements are (the raster of the sole, or one element in its middle, see
  * mild_sole_concentric) and what force a material gives on an element. Solvers, memory, friction,
- * drift and results are the same for all models. A model consists of a row of this list and a file,
- * src/ground/models/model_NAME.c. Everything else that names models is derived from these two. */
+ * drift and results are the same for all models. A model consists of a row of this list and one
+ * in a file, src/ground/models/model_*.c. All else that names models is derived from these two. */
 /* clang-format off */
 #define MILD_MODEL_LIST(ROW)                                                                       \
     ROW(MILD, mild)                  /* a developing cone under every element (the paper) */       \

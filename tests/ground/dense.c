@@ -9,7 +9,7 @@
 #include "ground/law/element_law.h"
 #include "ground/law/friction.h"
 #include "ground/law/impulse.h"
-#include "ground/models/resist.h"
+#include "ground/law/plate.h"
 #include "ground/sole/sole.h"
 #include "ground/step/scratch.h"
 
@@ -244,8 +244,8 @@ static void element_hold(double dt, DenseElement *e, double x, double y, double 
 
 /* Janosi and Hanamoto: with the path j that the element has slid, the nearer material's strength
  * c s + mu N has grown to the share 1 - exp(-j/K). */
-static void element_shear(double dt, DenseElement *e, const MildMaterial *m, double area,
-                          double slid) {
+static void dense_shear(double dt, DenseElement *e, const MildMaterial *m, double area,
+                        double slid) {
     double share = -expm1(-slid / m->shear_length);
     e->law.mu *= share;
     e->radius += e->u0 > 0.0 ? dt * share * m->cohesion * area : 0.0;
@@ -387,8 +387,8 @@ static void dense_element(Dense *d, const Find *find) {
         dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
     }
     if (nearer->model == MILD_MODEL_BEKKER) {
-        element_shear(d->dt, e, nearer, find->area_share * find->pitch * find->pitch,
-                      memory->drift[i]);
+        dense_shear(d->dt, e, nearer, find->area_share * find->pitch * find->pitch,
+                    memory->drift[i]);
     }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }

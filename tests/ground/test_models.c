@@ -2,7 +2,7 @@
  * matched to mild. */
 #include "ground_kit.h"
 
-#include "ground/models/resist.h"
+#include "ground/law/plate.h"
 
 #define SOFT_MODELS MILD_MODEL_RIGID
 #define LOAD (20.0 * KIT_GRAVITY) /* [N] half of the paper's robot */

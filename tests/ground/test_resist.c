@@ -3,7 +3,7 @@
 #include "ground_kit.h"
 
 #include "ground/law/begin.h"
-#include "ground/models/resist.h"
+#include "ground/law/plate.h"
 
 #define PI 3.14159265358979323846
 

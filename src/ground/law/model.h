@@ -1,4 +1,4 @@
-/* What a ground model's file, model_NAME.c, must provide. The model also has a row in
+/* What a ground model's file, models/model_*.c, must provide. The model also has a row in
  * MILD_MODEL_LIST (mild/ground.h).
  *
  * A model made of the curves of law.h needs nothing but that file and that row. A model with a new

@@ -5,8 +5,8 @@
  *     s = (c + p mu) (1 - exp(-j/K))
  * j is the distance that the element has slid since it touched down, which is its drift
  * (ElementMemory in element.h). */
+#include "ground/law/friction.h"
 #include "ground/law/model.h"
-#include "ground/law/shear.h"
 #include "ground/step/step.h"
 
 /* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four soils, in the rows

@@ -1,4 +1,4 @@
-/* The table of MILD_MODEL_LIST. Each model's file defines its row. */
+/* The table of MILD_MODEL_LIST. The models' files define its rows. */
 #include "ground/law/models.h"
 
 #include "ground/sole/sole.h"
@@ -10,6 +10,11 @@
 
 #define MODEL_DECLARE(id, name) extern const ModelRow model_##name;
 MILD_MODEL_LIST(MODEL_DECLARE)
+
+const ModelRow model_rigid = {
+    .info = {.summary = "the engine's own contact, in train, eval and play; no parameters",
+             .source = "MuJoCo"},
+};
 
 #define MODEL_ROW(id, name) &model_##name,
 static const ModelRow *const rows[MILD_MODELS] = {MILD_MODEL_LIST(MODEL_ROW)};

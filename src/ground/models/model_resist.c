@@ -1,8 +1,8 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
-/* Resistive force theory (plate.h) for the slots of a foot. */
-#include "ground/models/resist.h"
-
-#include "ground/law/element_law.h"
+/* Models of resistive force theory (plate.h), ecc_quasi and ecc_quasi_3d, for the slots of a foot. */
+#include "ground/law/model.h"
+#include "ground/law/plate.h"
+#include "ground/step/scratch.h"
 
 void mild_resist_plane(double beta, double gamma, double alpha[2]) {
     const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
@@ -124,24 +124,51 @@ static __attribute__((noinline)) void foot_resist(const FootScratch *foot,
     }
 }
 
-void resist_plane(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
-                  const double *rotation, const Motion *now) {
+/* In the vertical plane of motion. */
+static void resist_plane(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                         const double *rotation, const Motion *now) {
     foot_resist(foot, terrain, model, dt, rotation, now, 0);
 }
 
-void resist_space(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
-                  const double *rotation, const Motion *now) {
+static void resist_space(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                         const double *rotation, const Motion *now) {
     foot_resist(foot, terrain, model, dt, rotation, now, 1);
 }
 
-Law resist_law(const MildMaterial *material, double pitch) {
+/* The law of a level plate moving straight down: F = zeta 1e6 N/m^3 u per area. */
+static Law resist_law(const MildMaterial *material, double pitch) {
     const double area = pitch * pitch;
     return law_line(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
 }
 
-void resist_material(MildMaterial *material, double area) {
+/* Friction is 0, because the measured coefficients include the friction of the plate. */
+static void resist_material(MildMaterial *material, double area) {
     (void)area;
     material->zeta = 1.0;
     material->recovery = 0.0;
     material->mu = material->k_drift = material->b_drift = 0.0;
 }
+
+const ModelRow model_ecc_quasi = {
+    .info = {.summary = "resistive force theory under every element",
+             .source = "Li et al. 2013, Xiong et al. 2017",
+             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth", "refill"},
+             .scaled = {"zeta"},
+             .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
+    .law = resist_law,
+    .reference = resist_material,
+    .motion = LAW_PLANE,
+    .direction = resist_plane,
+};
+
+const ModelRow model_ecc_quasi_3d = {
+    .info = {.summary = "three-dimensional resistive force theory under every element",
+             .source = "Agarwal et al. 2023",
+             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth", "refill"},
+             .scaled = {"zeta"},
+             .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
+    .law = resist_law,
+    .reference = resist_material,
+    .motion = LAW_SPACE,
+    .direction = resist_space,
+};
