@@ -8,12 +8,12 @@
 #include "base/hd.h"
 #include "ground/law/begin.h"
 #include "ground/law/frame.h"
+#include "ground/law/friction.h"
 #include "ground/law/impulse.h"
 #include "ground/law/motion.h"
 #include "ground/law/plate.h"
 #include "ground/law/remember.h"
 #include "ground/law/rim.h"
-#include "ground/law/shear.h"
 #include "ground/terrain/map_view.h"
 
 #define CONTACT_FEET_MAX 4
