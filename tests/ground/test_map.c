@@ -1,7 +1,7 @@
 /* Height maps and patterns against their formulas. */
 #include "map_kit.h"
 
-#include "ground/terrain/map.h"
+#include "ground/terrain/grid.h"
 #include "ground/terrain/map_view.h"
 
 /* Waves and steps at random points: at grid points the formula, between them within the error of

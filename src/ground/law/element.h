@@ -5,7 +5,7 @@
  *     element_begin      begin.h      everything that does not depend on the new velocity
  *     element_explicit, element_drag  impulses that depend on the motion before the step alone
  *     element_resist     plate.h      a law that depends on the direction of motion
- *     element_shear      shear.h      friction that builds up with slip
+ *     element_shear      friction.h   friction that builds up with slip
  *     element_impulse    impulse.h    normal impulse at a trial velocity, any number of times
  *     friction_impulse   friction.h   tangential impulse at the same velocity
  *     element_remember   remember.h   memory at the end of the step

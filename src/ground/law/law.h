@@ -74,7 +74,7 @@ typedef enum {
 typedef enum {
     LAW_PLANE = 1 << 16, /* resistive force theory in the plane of motion (plate.h) */
     LAW_SPACE = 1 << 17, /* the same in three dimensions */
-    LAW_SHEAR = 1 << 18, /* shear strength that builds up with slip (shear.h) */
+    LAW_SHEAR = 1 << 18, /* shear strength that builds up with slip (friction.h) */
     LAW_RESIST = LAW_PLANE | LAW_SPACE,
     LAW_CREATES = 1 << 19 /* negative added mass or drag: element_explicit may not be 0 */
 } LawMotion;

@@ -35,21 +35,4 @@ int mesh_closed(const MildShape *mesh, double *volume);
 /* Bool: a point in the mesh's frame lies inside a closed mesh. */
 int mesh_contains(const MildShape *mesh, const double point[3]);
 
-/* ---- sole_edge.c: how far the cells of a plane raster are from the edge of the outline ---- */
-
-typedef struct {
-    double low[2];    /* [m] lower corner of the bounding box */
-    double high[2];   /* [m] upper corner */
-    double area;      /* [m^2] */
-    double center[2]; /* [m] centroid */
-} Outline;
-
-/* Bool: the point is inside the outline. */
-int outline_inside(const MildSoleDef *def, double x, double y);
-/* Mean and standard deviation of that distance over the n cells about (x, y) [m]. Cells cover more
- * or less than the outline, and each counts whole: so the distances are scaled to the mean over the
- * outline. work: [points] scratch space. */
-void sole_edges(const MildSoleDef *def, const Outline *outline, int n, const double *x,
-                const double *y, double *edge, double *spread, int *work);
-
 #endif

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "ground/step/state.h"
-#include "ground/terrain/map.h"
+#include "ground/terrain/grid.h"
 
 #define TURN 1e-6     /* [-] products of a rotation's columns may be off by this */
 #define SYMMETRY 1e-6 /* [-] difference of two mirrored numbers of A, over its scale */

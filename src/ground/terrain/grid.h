@@ -70,4 +70,11 @@ MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error);
  * an unusable value, when there are too many points, or when out of memory. */
 MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error);
 
+/* ---- what a terrain asks of its map: map.c ---- */
+
+/* Height [m] and gradient [-] at a point of the map. */
+double map_surface(const MildMap *map, double x, double y, double slope[2]);
+/* Label at a point of the map. */
+Label map_label(const MildMap *map, double x, double y);
+
 #endif

@@ -1,4 +1,4 @@
-#include "ground/terrain/map.h"
+#include "ground/terrain/grid.h"
 
 #include <stdlib.h>
 

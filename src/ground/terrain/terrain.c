@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "ground/terrain/map.h"
+#include "ground/terrain/grid.h"
 
 MildTerrain mild_terrain_uniform(const MildMaterial *material) {
     MildTerrain terrain = {.material_count = 1};
