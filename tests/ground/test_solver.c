@@ -226,7 +226,7 @@ static int check_states(const Kit *kit, int f, const MildElements *e) {
     return good;
 }
 
-/* Wrench, pressure centre and element arrays fit together; test_result.c has the zero moment
+/* Wrench, pressure centre and element arrays fit together; test_step.c has the zero moment
  * points. */
 TEST(test_outputs) {
     double worst = 0.0, worst_center = 0.0;

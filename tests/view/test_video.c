@@ -1,10 +1,13 @@
 /* The video file: whole under its name with the right number of frames, or one clear line and no
  * file. */
+#include "kit.h"
+
 #include <dirent.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "kit.h"
+#include "view/follow.h"
+#include "view/smooth.h"
 #include "view/video.h"
 
 #define WIDTH 96
@@ -133,6 +136,140 @@ TEST(odd_size_is_refused) {
     assert_null(video_open("x.mp4", 95, 64, 25, &error));
     assert_int_equal(error.status, MILD_ERROR_ARGUMENT);
     assert_null(video_open("x.mp4", 96, 64, 0, &error));
+}
+
+/* Edges of a picture that was drawn with one sample per pixel. */
+
+#define SAMPLES 16 /* of a side of a pixel, in the reference */
+
+static unsigned char from[HEIGHT][WIDTH][3], to[HEIGHT][WIDTH][3], luma[(HEIGHT + 1) * WIDTH];
+
+/* Bright above a line through the middle, dark below. */
+static int above(double x, double y, double slope) {
+    return y - 0.5 * HEIGHT > slope * (x - 0.5 * WIDTH);
+}
+
+static void draw(double slope) {
+    for (int j = 0; j < HEIGHT; j++) {
+        for (int i = 0; i < WIDTH; i++) {
+            memset(from[j][i], above(i + 0.5, j + 0.5, slope) ? 220 : 30, 3);
+        }
+    }
+}
+
+/* Share of the pixel above the line. */
+static double covered(int i, int j, double slope) {
+    int count = 0;
+    for (int k = 0; k < SAMPLES * SAMPLES; k++) {
+        count += above(i + (k % SAMPLES + 0.5) / SAMPLES, j + (k / SAMPLES + 0.5) / SAMPLES, slope);
+    }
+    return (double)count / (SAMPLES * SAMPLES);
+}
+
+/* [-] of 255: root mean square from the true picture, over the pixels that the line cuts. */
+static double error_of(unsigned char picture[HEIGHT][WIDTH][3], double slope) {
+    double sum = 0;
+    int cut = 0;
+    for (int j = 2; j < HEIGHT - 2; j++) {
+        for (int i = 2; i < WIDTH - 2; i++) {
+            double share = covered(i, j, slope);
+            if (share > 0 && share < 1) {
+                sum += pow(picture[j][i][1] - (30 + 190 * share), 2);
+                cut++;
+            }
+        }
+    }
+    return sqrt(sum / cut);
+}
+
+/* Steps are longest where an edge is close to a row or a column: there the error halves. The sixth
+ * is mixed along its own direction, not along its mirror image, which would leave more. Elsewhere
+ * it does not grow. */
+TEST(slanted_edges_come_closer_to_the_truth) {
+    const double slopes[] = {0.06, -0.12, 0.2, 8, -16, 0.9, -0.3, 0.45, -1.0, 3};
+    for (int k = 0; k < 10; k++) {
+        draw(slopes[k]);
+        smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
+        double before = error_of(from, slopes[k]), after = error_of(to, slopes[k]);
+        print_message("slope %6.2f: off by %.0f before, %.0f after\n", slopes[k], before, after);
+        assert_true(after < (k < 6 ? 0.6 : 1.01) * before);
+    }
+}
+
+/* A level edge has no steps, and grain is no edge. */
+TEST(the_rest_stays) {
+    draw(0);
+    smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
+    assert_memory_equal(from, to, sizeof from);
+    srand(5);
+    for (int j = 0; j < HEIGHT; j++) {
+        for (int i = 0; i < WIDTH; i++) {
+            for (int c = 0; c < 3; c++) {
+                from[j][i][c] = (unsigned char)(178 + rand() % 45);
+            }
+        }
+    }
+    smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
+    assert_memory_equal(from, to, sizeof from);
+}
+
+/* A slanted line two pixels wide keeps its brightness: colours are mixed along it, not across. */
+TEST(lines_stay) {
+    for (int side = 0; side < 2; side++) {
+        memset(from, 30, sizeof from);
+        for (int j = 1; j < HEIGHT; j++) {
+            for (int k = 0; k < 2; k++) {
+                memset(from[j][side ? WIDTH - 20 - j + k : 20 + j + k], 220, 3);
+            }
+        }
+        smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
+        for (int j = 8; j < HEIGHT - 8; j++) {
+            assert_true(to[j][side ? WIDTH - 20 - j : 20 + j][1] > 170);
+        }
+    }
+}
+
+/* The camera's filter: by time and not by frames, and not behind what moves evenly. */
+
+#define LAG 0.4
+#define SPEED 0.6
+
+/* Where the camera looks along x after `seconds` behind a target that starts to move at once. */
+static double followed(double seconds, double rate) {
+    Follow follow;
+    double target[3] = {1, 2, 3}, look[3];
+    follow_jump(&follow, target);
+    int frames = (int)lround(seconds * rate);
+    for (int k = 1; k <= frames; k++) {
+        target[0] = 1 + SPEED * k / rate;
+        follow_step(&follow, target, 1 / rate, LAG);
+    }
+    follow_position(&follow, look);
+    assert_true(look[1] == 2 && look[2] == 3);
+    return look[0] - 1;
+}
+
+/* The response of (1 + 2 T s)/(1 + T s)^2 to the ramp v t: v t (1 - exp(-t/T)), by hand. Five
+ * frames a second give what hundred give, up to the path within a frame of the filter's own output.
+ */
+TEST(same_at_any_frame_rate) {
+    double worst = 0, seconds[] = {0.4, 1, 2, 5};
+    for (int k = 0; k < 4; k++) {
+        double t = seconds[k], wanted = SPEED * t * (1 - exp(-t / LAG));
+        worst = fmax(worst, fabs(followed(t, 100) - wanted));
+        worst = fmax(worst, 0.1 * fabs(followed(t, 5) - wanted));
+    }
+    print_message("camera off by %.2f mm\n", 1e3 * worst);
+    assert_true(worst < 1e-3);
+}
+
+TEST(no_time_no_motion) {
+    Follow follow;
+    double look[3];
+    follow_jump(&follow, (const double[3]){1, 1, 1});
+    follow_step(&follow, (const double[3]){9, 9, 9}, 0, LAG);
+    follow_position(&follow, look);
+    assert_true(look[0] == 1 && look[1] == 1 && look[2] == 1);
 }
 
 TEST_MAIN(NULL, NULL)
