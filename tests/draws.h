@@ -3,7 +3,10 @@
 #define TEST_DRAWS_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
+
+#include "base/float.h"
 
 static inline double kit_uniform(uint64_t *state, double low, double high) {
     uint64_t x = *state += 0x9e3779b97f4a7c15u;
@@ -20,6 +23,14 @@ static inline int kit_index(uint64_t *state, int count) {
 /* Log-uniform. */
 static inline double kit_spread(uint64_t *state, double low, double high) {
     return exp(kit_uniform(state, log(low), log(high)));
+}
+
+/* Numbers rounded to float, for tests that compare float with double arithmetic. */
+
+static inline void kit_round(double *x, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        x[i] = float_rounded(x[i]);
+    }
 }
 
 #endif

@@ -3,8 +3,8 @@
 #include "base/random.h"
 
 #include "base/student.h"
+#include "draws.h"
 #include "kit.h"
-#include "round.h"
 
 enum { COUNT = 200000 };
 

@@ -5,7 +5,6 @@
 #include "batch_kit.h"
 #include "ground/map_kit.h"
 #include "ground/surface_kit.h"
-#include "points_kit.h"
 
 enum { ROBOTS = 48, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };
 

@@ -1,10 +1,9 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
  * code in double and in float, of one, two and four feet, on level ground and on maps. */
 #include "case_kit.h"
+#include "draws.h"
 #include "ground/batch/contact.h"
 #include "ground/sole/sole.h"
-#include "points_kit.h"
-#include "round.h"
 
 static MildSole *left, *right, *centers[2], *plate, *small_plate;
 

@@ -10,8 +10,8 @@
 #include "engine_text.h"
 
 #include "base/random.h"
+#include "draws.h"
 #include "robot/sim.h"
-#include "round.h"
 
 /* Float takes these numbers as they are, so that its error is that of its arithmetic. */
 static inline void round_case(EngineCase *in) {

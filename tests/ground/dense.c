@@ -2,7 +2,6 @@
 
 #include "dense_find.h"
 #include "dense_law.h"
-#include "dense_power.h"
 
 /* The constants of these five. */
 #include "ground/law/begin.h"

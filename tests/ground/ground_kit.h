@@ -5,7 +5,7 @@
 
 #include "draws.h"
 #include "materials.h"
-#include "sa01_sole.h"
+#include "sa01.h"
 
 #define KIT_PITCH 0.0195
 #define KIT_SOLE_Z (-0.055)

@@ -3,7 +3,7 @@
 #include "map_kit.h"
 #include "surface_kit.h"
 
-#include "round.h"
+#include "draws.h"
 
 static MildSole *soles[2]; /* left, right */
 

@@ -5,7 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "sa01_sole.h"
+#include "sa01.h"
 #include "task_kit.h"
 
 /* Middle of a sole's bounds in the foot frame (docs of the robot: 5.5 mm outward, 55 mm below the
