@@ -4,7 +4,7 @@
 #define CONTROL_LEARNED_H
 
 #include "control/controller.h"
-#include "learn/inside.h"
+#include "learn/network.h"
 #include "learn/policy.h"
 
 /* The policy of a file, if it is one for this task and robot. note: as of policy_load. */

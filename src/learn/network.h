@@ -16,10 +16,26 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "learn/inside.h"
 #include "learn/mlp.h"
 #include "learn/policy_def.h"
 #include "mild/error.h"
+
+/* ---- what passes between the networks, to look at and to replace ---- */
+
+/* Outputs, for each row; NULL: not wanted. */
+typedef struct {
+    float *latent;    /* [rows][latent] z = mu */
+    float *theta;     /* [rows][policy_theta] theta1, then theta2 */
+    float *modulated; /* [rows][latent] z~, as the actor gets it */
+    float *estimates; /* [rows][estimates] of the encoder */
+} PolicyInside;
+
+/* What the actor gets in the place of the networks' own numbers. */
+typedef struct {
+    const float *latent;    /* [latent] z; NULL: mu */
+    const float *estimates; /* [estimates], for the actor alone; NULL: the encoder's */
+    const float *theta;     /* [policy_theta]; NULL: that of the modulation */
+} PolicyInstead;
 
 #define NETWORK_ACTIONS_MAX 64
 #define NETWORK_MLPS 5

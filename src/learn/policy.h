@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "base/pool.h"
-#include "learn/inside.h"
+#include "learn/network.h"
 #include "learn/policy_def.h"
 #include "mild/error.h"
 

@@ -5,10 +5,10 @@
 #include <string.h>
 
 #include "learn/noise.h"
+#include "learn/ppo_batch.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_private.h"
 #include "learn/ppo_step.h"
-#include "learn/returns.h"
 
 size_t ppo_carve_batch(PpoBatch *b, const Network *n, void *block) {
     const size_t samples = (size_t)b->steps * (size_t)b->envs, more = samples + (size_t)b->envs;

@@ -1,4 +1,4 @@
-#include "learn/ppo_file.h"
+#include "learn/ppo_private.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -6,7 +6,6 @@
 
 #include "base/file.h"
 #include "learn/policy_file.h"
-#include "learn/ppo_private.h"
 
 enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
 

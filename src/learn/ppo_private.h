@@ -8,8 +8,10 @@
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
+#include "learn/ppo.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
+#include "learn/safetensors.h"
 #include "mild/error.h"
 
 /* ---- backends ---- */
@@ -97,5 +99,11 @@ static inline int ppo_piece_begin(int count, int piece) {
  * (normalised over the usable samples), returns, and ppo->substitute and ppo->starved. A sample is
  * usable if it is valid and its reward and value are finite. */
 void ppo_returns(Ppo *ppo, PpoReport *report);
+
+/* Checkpoints from memory; ppo_save and ppo_load of ppo.h are the ones for users. */
+
+/* ppo_load from an open file; `path` names it in messages. */
+MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
+                         size_t extra_size, MildError *error);
 
 #endif

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
+#include "learn/ppo_batch.h"
 #include "learn/ppo_step.h"
-#include "learn/returns.h"
 
 static void returns_piece(void *context, int piece, int thread) {
     (void)thread;

@@ -2,7 +2,6 @@
  * with a message and nothing changed, or loaded whole and finite. */
 #include "fuzz.h"
 #include "learn/ppo.h"
-#include "learn/ppo_file.h"
 #include "learn/ppo_private.h"
 
 enum { EXTRA = 4, ENVS = 1 };

@@ -2,8 +2,8 @@
 
 #include "learn/cuda/launch.h"
 #include "learn/noise.h"
+#include "learn/ppo_batch.h"
 #include "learn/ppo_step.h"
-#include "learn/returns.h"
 
 /* ---- acting ---- */
 

@@ -1,6 +1,6 @@
 /* Passes of the learner around the networks: sampling of actions, advantages, order of the samples,
  * optimiser and counters. They are ppo.c and ppo_returns.c on the device; both share ppo_step.h,
- * returns.h, order.h and adam.h. Decisions are made on the device, so that an update needs no
+ * ppo_batch.h, order.h and adam.h. Decisions are made on the device, so that an update needs no
  * answer from the CPU. */
 #ifndef MILD_GPU_UPDATE_H
 #define MILD_GPU_UPDATE_H
