@@ -12,8 +12,6 @@
 #include "base/text.h"
 #include "mild/batch.h"
 #include "run/eval/actions.h"
-#include "run/eval/feet.h"
-#include "run/eval/inside.h"
 #include "run/eval/other_ground.h"
 #include "run/eval/track.h"
 

@@ -8,7 +8,6 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/figure.h"
 #include "app/fit_work.h"
 #include "app/grounds.h"
 #include "app/report.h"

@@ -4,7 +4,7 @@
 
 #include "env/envs.h"
 #include "eval_kit.h"
-#include "run/eval/feet.h"
+#include "run/eval/track.h"
 
 enum { TRIALS = 2, PERIODS = 10, OF_PERIOD = 4, STEPS = PERIODS * OF_PERIOD, COLUMNS = 16 };
 

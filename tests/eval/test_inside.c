@@ -3,7 +3,7 @@
 #include "eval_kit.h"
 
 #include "learn/policy.h"
-#include "run/eval/inside.h"
+#include "run/eval/actions.h"
 
 enum { TRIALS = 2, STEPS = 150, LATENT = 16, TEXTS = 2, COLUMNS = 5 + 2 * LATENT + 2 + 11 };
 enum { SPEED = 2, TIME, PHASE, Z, MODULATED = Z + LATENT, THETA = MODULATED + LATENT };

@@ -10,7 +10,6 @@
 #include "device/device.h"
 #include "env/envs.h"
 #include "run/eval/actions.h"
-#include "run/eval/feet.h"
 #include "run/eval/track.h"
 
 #define HEADING_GAIN 1.0  /* [1/s] */

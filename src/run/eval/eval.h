@@ -45,7 +45,7 @@ typedef struct {
     const EvalCallback *callback;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
     FILE *track;   /* one for each policy step of each trial, see eval/track.h */
-    FILE *feet;    /* one for each foot in each physics step, see eval/feet.h */
+    FILE *feet;    /* one for each foot in each physics step, see eval/track.h */
 } EvalDef;
 
 /* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at

@@ -7,7 +7,23 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "run/train/settings.h"
+#include "mild/error.h"
+
+/* The keys and values of a config.ini as texts, whatever version wrote it. */
+typedef struct {
+    char *key; /* "section.key" */
+    char *value;
+} Setting;
+
+typedef struct {
+    Setting *list; /* [count] in the order of the text */
+    int count;
+} Settings;
+
+/* Fails when memory runs out or a line is neither a section nor a key, with "NAME:LINE: reason";
+ * there is then nothing to free. */
+MildStatus settings_read(const char *text, const char *name, Settings *settings, MildError *error);
+void settings_free(Settings *settings);
 
 enum { EVENTS_TAG_MAX = 100 };
 
