@@ -7,7 +7,6 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/context.h"
-#include "app/figure.h"
 #include "app/report.h"
 #include "base/file.h"
 #include "env/actuator/fit.h"

@@ -5,7 +5,6 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/figure.h"
 #include "app/grounds.h"
 #include "app/report.h"
 #include "app/robots.h"

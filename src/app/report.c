@@ -1,10 +1,15 @@
 #include "app/report.h"
 
+#include <errno.h>
+#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "base/file.h"
+#include "base/paths.h"
 
 MildStatus report_text(const char *text, size_t size, const char *path, MildError *error) {
     if (strcmp(path, "-") != 0) {
@@ -28,4 +33,38 @@ MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     MildStatus status = report_text(line, length + 1, path, error);
     free(line);
     return status;
+}
+
+extern char **environ;
+
+MildStatus figure_draw(const char *script, const char *data, const char *picture, const char *title,
+                       MildError *error) {
+    char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256];
+    path_data(".venv/bin/python", python);
+    path_data(script, code_path);
+    FILE *text = file_open(code_path, error); /* as an input, it cannot be the output, too */
+    if (!text) {
+        return error->status;
+    }
+    fclose(text);
+    snprintf(from, sizeof from, "%s", data);
+    snprintf(to, sizeof to, "%s", picture);
+    snprintf(above, sizeof above, "%s", title ? title : "");
+    if (access(python, X_OK) != 0) {
+        const char *caller = getenv("MILD_PYTHON"); /* of python -m mild */
+        snprintf(python, sizeof python, "%s", caller && *caller ? caller : "python3");
+    }
+    char *arguments[] = {python, code_path, from, to, title ? above : NULL, NULL};
+    pid_t child;
+    int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
+    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) {
+        continue;
+    }
+    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_IO,
+                     "%.150s: not drawn, Python with matplotlib is needed (make setup, or pip "
+                     "install matplotlib); the numbers are in %.150s",
+                     picture, data);
 }

@@ -1,4 +1,4 @@
-#include "view/smooth.h"
+#include "view/view_parts.h"
 
 #include <math.h>
 #include <string.h>

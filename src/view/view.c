@@ -6,11 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "view/follow.h"
-#include "view/look.h"
 #include "view/model.h"
 #include "view/relief.h"
-#include "view/smooth.h"
 #include "view/view_parts.h"
 
 #define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */

@@ -63,4 +63,34 @@ void sight_thin_out(mjvScene *scene, int first, double far, double pixels, int s
 /* A shadow where the shadow map does not reach. height: [m] of the ground there. */
 void sight_draw_spot(mjvScene *scene, const double place[3], double height);
 
+/* ---- smooth.c ---- */
+
+/* Smooths the steps along the edges of a picture that was drawn with one sample per pixel. Four
+ * samples a pixel cost a software renderer more than twice the time of the whole picture; this
+ * costs a few milliseconds. */
+
+/* from, to: [height][width][3], not the same. luma: [height + 1][width] for use inside. Pixels
+ * without an edge beside them, and those of the border, are copied. */
+void smooth_edges(const unsigned char *from, int width, int height, unsigned char *luma,
+                  unsigned char *to);
+/* Turns a picture upside down. */
+void smooth_flip(const unsigned char *rgb, int width, int height, unsigned char *flipped);
+
+/* ---- sight.c: how a camera follows ---- */
+
+/* A camera follows what it looks at: smoothly, by the time that passed and not by the number of
+ * frames, and without staying behind something that moves evenly. */
+
+typedef struct {
+    double once[3], twice[3]; /* [m] the target filtered once and twice */
+    double target[3];         /* [m] at the last step */
+} Follow;
+
+/* The camera jumps to the target. */
+void follow_jump(Follow *follow, const double target[3]);
+/* elapsed: [s] since the last step; lag: [s] time constant. */
+void follow_step(Follow *follow, const double target[3], double elapsed, double lag);
+/* [m] Where the camera looks. */
+void follow_position(const Follow *follow, double position[3]);
+
 #endif

@@ -1,6 +1,6 @@
 /* The ground that keys change: what each key does to the terrain, and that a standing robot sinks
  * to the depth of the law of the changed material. */
-#include "app/live.h"
+#include "app/play.h"
 #include "control/stand.h"
 #include "robots.h"
 #include "sa01.h"

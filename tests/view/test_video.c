@@ -6,9 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "view/follow.h"
-#include "view/smooth.h"
 #include "view/video.h"
+#include "view/view_parts.h"
 
 #define WIDTH 96
 #define HEIGHT 64
