@@ -67,7 +67,7 @@ double *fit_number(MildMaterial *material, const MildField *field);
 void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
                 const FitPoint *points, int count, double *force);
 
-/* ---- fit_drag.c: a plate that slides, on ground where slip costs support ---- */
+/* ---- a plate that slides, on ground where slip costs support ---- */
 
 /* For mild and mild_merged.
  *
@@ -90,7 +90,7 @@ int fit_drag_is_next(const FitPoint *row);
 void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
                      int count, double *force);
 
-/* ---- fit_slide.c: the rows of a fit of such a plate, from those of its record ---- */
+/* ---- the rows of a fit of such a plate, from those of its record ---- */
 
 /* The rows of a fit, rows[2 * count], from those that fit_sliding found on a plate. curve: the
  * force that a press of the ground has. Returns their number; 0 where nothing pushes up. */

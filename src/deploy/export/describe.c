@@ -1,4 +1,4 @@
-#include "deploy/export/describe.h"
+#include "deploy/export/export.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "base/file.h"
-#include "deploy/export/describe.h"
+#include "deploy/export/export.h"
 #include "onnx.pb-c.h"
 
 #define IR_VERSION 7
