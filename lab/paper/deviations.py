@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Table of the trainings of lab/paper/deviations.sh: deviations.py FOLDER. A row per change, over its seeds: trials that stayed up, mean error of
+"""Table of the trainings of lab/paper/changes.sh deviations: deviations.py FOLDER. A row per change, over its seeds: trials that stayed up, mean error of
 the speed, cost of transport and swing clearance over grounds and speeds, largest torque."""
 import json
 import pathlib
@@ -42,7 +42,7 @@ def main():
     for path in sorted(pathlib.Path(sys.argv[1]).glob("*-*.json")):
         runs.setdefault(path.stem.rsplit("-", 1)[0], []).append(measures(path))
     if not runs:
-        fail(f"no NAME-SEED.json in {sys.argv[1]}; lab/paper/deviations.sh makes them")
+        fail(f"no NAME-SEED.json in {sys.argv[1]}; lab/paper/changes.sh deviations makes them")
     print("| set back | seeds | upright | speed off [m/s] | cost of transport | clearance [mm] | largest torque [N m] |\n|---|---|---|---|---|---|---|")
     for name in sorted(runs, key=lambda name: (name != FIRST, name)):
         up, trials, error, cost, clearance, torque = zip(*runs[name])

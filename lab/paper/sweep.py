@@ -6,8 +6,8 @@
   lab/paper/sweep.py slurm runs/sweep --sbatch "--gres=gpu:1 --time=30 --partition=gpu"    # a job array; --most 16: so many at a time
   lab/paper/sweep.py table runs/sweep                              # what is there, as one table: runs/sweep/table.csv
 
-Experiments: models (lab/paper/train.sh), latent (latent.sh), deviations (deviations.sh), factorial (factorial.py, a task for each
-controller, which is many trainings). A task is one call of such a script for one name and one seed; then the policy walks, if the script
+Experiments: models (lab/paper/train.sh), latent and deviations (changes.sh), factorial (factorial.py, a task for each controller, which
+is many trainings). A task is one call of such a script for one name and one seed; then the policy walks, if the script
 has not measured it, and FOLDER/EXPERIMENT/NAME-SEED.json has the result. Tasks with a result are done: the same command goes on where it
 stopped, after a crash or with more seeds, and two launchers may share a folder. FOLDER/log/EXPERIMENT.NAME-SEED has what a task
 printed. GNU parallel and Slurm are Debian's packages parallel and slurm-client. MILD is the program (default build/mild)."""
@@ -28,7 +28,7 @@ from deviations import measures
 HERE = pathlib.Path(__file__).resolve().parent
 MILD = os.environ.get("MILD", str(HERE.parents[1] / "build/mild"))
 JUDGE = ["--model", "mild", "--train.device=cpu", "--train.robots=mujoco", "--ground", "rigid,rubber,foam45,sand_loose", "--speed", "0.3,0.6"]
-SCRIPTS = {"models": "train.sh", "latent": "latent.sh", "deviations": "deviations.sh", "factorial": "factorial.py"}
+SCRIPTS = {"models": ["train.sh"], "latent": ["changes.sh", "latent"], "deviations": ["changes.sh", "deviations"], "factorial": ["factorial.py"]}
 
 
 def fail(text):
@@ -40,12 +40,12 @@ def fail(text):
 
 def names_of(experiment):
     """Those that its script knows."""
-    text = (HERE / SCRIPTS[experiment]).read_text(encoding="utf-8")
+    text = (HERE / SCRIPTS[experiment][0]).read_text(encoding="utf-8")
     if experiment == "models":
         return re.search(r"models=\((\w[^)]*)\)", text).group(1).split()
     if experiment == "factorial":
         return re.findall(r'"(\w+)": "', re.search(r"^CONTROLLERS = \{(.*)\}", text, re.M).group(1))
-    return re.findall(r"^    \[(\w+)\]=", text, re.M)
+    return re.findall(r"^ *\[(\w+)\]=", re.search(rf"^{experiment}\(\) {{(.*?)^}}", text, re.M | re.S).group(1), re.M)
 
 
 def tasks_of(experiments, seeds):
@@ -82,7 +82,7 @@ def work(folder, task, options):
         if code == 0:
             shutil.copyfile(own / "factorial.json", result)
         return code
-    code = call([HERE / SCRIPTS[experiment], target.parent, f"{seed}-{seed}", name])
+    code = call([HERE / SCRIPTS[experiment][0], *SCRIPTS[experiment][1:], target.parent, f"{seed}-{seed}", name])
     if code == 0 and not result.is_file() and policy.is_file():
         part = result.with_name(result.name + ".part")
         code = call([MILD, "eval", "--policy", policy, "--config", target.with_name(target.name + ".ini"), *JUDGE, "--json", part, *options],

@@ -97,8 +97,10 @@ def rows_of(folder):
 # ---- which tasks there are: those of the scripts, a seed of all first ----
 listed = run("list").split()
 assert listed[:2] == ["models.mild-1", "models.con_cone-1"] and listed[-1].endswith("-3") and len(set(listed)) == len(listed)
-for script, experiment, form in (("deviations.sh", "deviations", r"^    \[(\w+)\]="), ("latent.sh", "latent", r"^    \[(\w+)\]=")):
-    names = set(re.findall(form, (root / "lab/paper" / script).read_text(), re.M))
+for experiment, first, count in (("deviations", "as_it_is", 31), ("latent", "none", 10)):
+    said = subprocess.run([root / "lab/paper/changes.sh", experiment, work / "none", "1", "nosuch"], capture_output=True, text=True, check=False).stderr
+    names = set(said.split("choose from ")[1].split())
+    assert first in names and len(names) == count, said
     assert {f"{experiment}.{name}-2" for name in names} == {task for task in listed if task.startswith(experiment) and task.endswith("-2")}
 assert run("list", "factorial", "--seeds", 2).split() == [f"factorial.{name}-2" for name in ("mlp", "clock", "ht2", "flat", "ours")]
 
@@ -139,7 +141,7 @@ made()
 run("run", out, "models", "--seeds", 3)
 assert len(made()) == 2
 
-# ---- one seed alone; what latent.sh has measured walks like the others, by its own config ----
+# ---- one seed alone; what changes.sh latent has measured walks like the others, by its own config ----
 run("task", work / "alone", "models.mild-3")
 assert [line.split()[-1] for line in made()] == ["--train.seed=3", "eval"]
 run("task", work / "alone", "latent.window-2")

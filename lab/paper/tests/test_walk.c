@@ -3,7 +3,6 @@
 #include "kit.h"
 
 #include "base/random.h"
-#include "paper/control/dcm.h"
 #include "paper/control/walk.h"
 #include "paper/control/wrench.h"
 
