@@ -27,7 +27,7 @@
 #include "robot/limits.h"
 #include "robot/robot.h"
 
-/* ---- key.c: the key that a robot and its runner may share, and the numbers of sessions ---- */
+/* ---- the key that a robot and its runner may share, and the numbers of sessions ---- */
 
 /* A seal is BLAKE2b of 16 bytes under the key (--key). */
 

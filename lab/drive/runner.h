@@ -18,7 +18,7 @@
 #include "env/task/task.h"
 #include "identify/belief/belief.h"
 
-/* ---- times.c: a histogram of durations from 1 us to 100 s ---- */
+/* ---- a histogram of durations from 1 us to 100 s ---- */
 
 enum { TIMES_DECADE = 24, TIMES_BINS = 8 * TIMES_DECADE }; /* each bin 10 % wide */
 

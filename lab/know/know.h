@@ -9,7 +9,7 @@
 #include "identify/belief/belief.h"
 #include "mild/ground.h"
 
-/* ---- prior.c: the grounds that a walk is asked about ---- */
+/* ---- study.c: the grounds that a walk is asked about ---- */
 
 /* A preset of mild whose stiffness,
  * friction and slip length are drawn anew, each by itself and evenly in its logarithm. */
