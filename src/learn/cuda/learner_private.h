@@ -2,7 +2,6 @@
 #ifndef MILD_GPU_LEARNER_PRIVATE_H
 #define MILD_GPU_LEARNER_PRIVATE_H
 
-#include "learn/cuda/mlp.h"
 #include "learn/cuda/network.h"
 #include "learn/cuda/update.h"
 #include "learn/ppo_private.h"
