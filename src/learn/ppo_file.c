@@ -1,3 +1,4 @@
+#include "learn/ppo.h"
 #include "learn/ppo_private.h"
 
 #include <math.h>
@@ -409,11 +410,14 @@ MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_
     return status;
 }
 
-int ppo_file_is_whole(const char *path) {
-    Safetensors *file = safetensors_read(path, NULL);
-    const int whole = file && safetensors_find(file, "train.history");
+MildStatus ppo_file_is_whole(const char *path, int *whole, MildError *error) {
+    Safetensors *file = safetensors_read(path, error);
+    if (!file) {
+        return error->status;
+    }
+    *whole = safetensors_find(file, "train.history") != NULL;
     safetensors_destroy(file);
-    return whole;
+    return MILD_OK;
 }
 
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {

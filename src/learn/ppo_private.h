@@ -8,7 +8,6 @@
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
-#include "learn/ppo.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
 #include "learn/safetensors.h"
@@ -100,7 +99,7 @@ static inline int ppo_piece_begin(int count, int piece) {
  * usable if it is valid and its reward and value are finite. */
 void ppo_returns(Ppo *ppo, PpoReport *report);
 
-/* Checkpoints from memory; ppo_save and ppo_load of ppo.h are the ones for users. */
+/* ---- checkpoints from memory; ppo_save and ppo_load of ppo.h are the ones for users ---- */
 
 /* ppo_load from an open file; `path` names it in messages. */
 MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,

@@ -264,4 +264,24 @@ TEST(notes_are_cut) {
     toy_run_close(&run);
 }
 
+/* Whole, of the learner alone, or none: who resumes would take new episodes for the saved ones. */
+TEST(whole_checkpoints_are_told) {
+    MildError error = {0};
+    ToyRun run;
+    int whole = 0;
+    char kept[8] = {0};
+    run_open_toy(&run);
+    save(&run);
+    assert_int_equal(ppo_file_is_whole(PATH, &whole, &error), MILD_OK);
+    assert_true(whole);
+    assert_int_equal(ppo_save_learner(run.ppo, PATH, kept, sizeof kept, "toy", &error), MILD_OK);
+    assert_int_equal(ppo_file_is_whole(PATH, &whole, &error), MILD_OK);
+    assert_false(whole);
+    assert_int_equal(truncate(PATH, 40), 0);
+    assert_refused(ppo_file_is_whole(PATH, &whole, &error), MILD_ERROR_FORMAT, &error, PATH);
+    remove(PATH);
+    assert_refused(ppo_file_is_whole(PATH, &whole, &error), MILD_ERROR_IO, &error, PATH);
+    toy_run_close(&run);
+}
+
 TEST_MAIN(NULL, NULL)

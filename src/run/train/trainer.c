@@ -8,7 +8,7 @@
 #include "base/paths.h"
 #include "device/ranks/device.h"
 #include "learn/cuda/learner.h"
-#include "run/train/envs.h"
+#include "run/train/experiment.h"
 
 struct Trainer {
     ExperimentDef def;
@@ -333,8 +333,14 @@ static MildStatus load_learner(Trainer *trainer, const char *path, MildError *er
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
     size_t bytes;
     char *state = envs_state(trainer->envs.envs, &bytes);
-    const int leads = ranks_number(trainer->ranks) == 0,
-              whole = ranks_any(trainer->ranks, leads && state && ppo_file_is_whole(path));
-    return whole ? ppo_load(trainer->ppo, path, state, bytes, error)
-                 : load_learner(trainer, path, error);
+    int whole = 0;
+    MildStatus status = state && ranks_number(trainer->ranks) == 0
+                            ? ppo_file_is_whole(path, &whole, error)
+                            : MILD_OK;
+    status = ranks_agree(trainer->ranks, status, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    return ranks_any(trainer->ranks, whole) ? ppo_load(trainer->ppo, path, state, bytes, error)
+                                            : load_learner(trainer, path, error);
 }
