@@ -25,7 +25,7 @@ add_library(mujoco::mujoco SHARED IMPORTED GLOBAL)
 set_target_properties(mujoco::mujoco PROPERTIES IMPORTED_LOCATION ${mujoco_library}
   INTERFACE_INCLUDE_DIRECTORIES ${mujoco_include})
 
-# What the layers link: the library, or in a wheel the headers alone (cmake/Versions.cmake).
+# What the layers link: the library, or in a wheel the headers alone (cmake/Wheel.cmake).
 if(SKBUILD)
   set(mild_mujoco mujoco_headers)
 else()
