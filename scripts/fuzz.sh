@@ -31,12 +31,13 @@ length() {
 }
 
 fuzz() {
-    local target=$1 kept=$build/tests/corpus/$1 dictionary=tests/fuzz/dict/$1.dict options=()
+    local target=$1 kept=$build/tests/corpus/$1 dictionary=$build/$1.dict options=()
     if [ "$target" = config ]; then
-        dictionary=$build/config.dict
         grep -oE '^[a-z_0-9]+ =|^\[[a-z]+\]' configs/default.ini | sort -u | sed 's/.*/"&"/' >"$dictionary"
+    else
+        awk -v of="$target" '/^# / { on = 0; for (i = 2; i <= NF; i++) { on = on || $i == of }; next } on' tests/fuzz/words.dict >"$dictionary"
     fi
-    [ ! -e "$dictionary" ] || options+=("-dict=$dictionary")
+    [ ! -s "$dictionary" ] || options+=("-dict=$dictionary")
     mkdir -p $build/learned/"$target"
     $build/tests/fuzz_"$target" -runs="$runs" -max_total_time=$((60 * minutes)) -max_len="$(length "$target")" -timeout=60 \
         -rss_limit_mb=4000 -artifact_prefix=$build/"$target"- -print_final_stats=1 "${options[@]}" $build/learned/"$target" \
