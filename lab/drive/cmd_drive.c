@@ -11,7 +11,6 @@
 #include "drive/drive.h"
 #include "drive/simulated.h"
 #include "identify/belief/file.h"
-#include "identify/belief/log.h"
 #include "lab/commands.h"
 
 #define ADDRESS "127.0.0.1:9870"

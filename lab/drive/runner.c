@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "control/speed_hold.h"
-#include "identify/belief/log.h"
+#include "identify/belief/file.h"
 
 #define CLOCK_DRIFT 1e-3 /* [-] by which two clocks may run apart */
 #define CLOCK_JUMP 1.0   /* [s] by which no state is faster than the fastest */

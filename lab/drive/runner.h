@@ -108,7 +108,7 @@ typedef struct {
     uint64_t peer;       /* only this sender is heard; 0: the first; port 0: any of the host */
     const Key *key;      /* borrowed; NULL: none */
     const BeliefNet *belief; /* borrowed; what the robot knows of its ground; NULL: nothing */
-    FILE *log;               /* borrowed; the frames that the policy sees (belief/log.h); NULL */
+    FILE *log;               /* borrowed; the frames that the policy sees (belief/file.h); NULL */
 } RunnerDef;
 /* A sender: address and port (udp_sender). */
 #define RUNNER_PORT 0xffffu

@@ -15,7 +15,7 @@
 #include "base/text.h"
 #include "ground/law/models.h"
 #include "ground/soil/soil.h"
-#include "identify/belief/log.h"
+#include "identify/belief/file.h"
 #include "identify/fit_law.h"
 #include "identify/press.h"
 

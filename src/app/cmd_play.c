@@ -16,7 +16,6 @@
 #include "app/report.h"
 #include "base/text.h"
 #include "identify/belief/file.h"
-#include "identify/belief/log.h"
 #include "view/relief.h"
 
 #define GRAVITY 9.81

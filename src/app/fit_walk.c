@@ -8,7 +8,6 @@
 #include "app/report.h"
 #include "base/paths.h"
 #include "identify/belief/file.h"
-#include "identify/belief/log.h"
 
 #define PERIOD 0.01 /* [s] of a frame */
 

@@ -10,7 +10,7 @@
 #include "app/progress.h"
 #include "base/clock.h"
 #include "control/speed_hold.h"
-#include "identify/belief/log.h"
+#include "identify/belief/file.h"
 #include "run/eval/eval.h"
 
 static const double key_factor = 1.1; /* of friction or stiffness, a key */

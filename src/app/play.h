@@ -65,7 +65,7 @@ typedef struct {
     double jump;                 /* [m] see EvalDef.jump */
     uint64_t seed;
     const BeliefNet *belief; /* what the robot knows of its ground; NULL: it has none */
-    FILE *log;               /* of the frames that its policy sees (belief/log.h); NULL: none */
+    FILE *log;               /* of the frames that its policy sees (belief/file.h); NULL: none */
     int window;              /* bool: real time, keys */
     int presets; /* materials at the end of the scene's terrain that keys lay under the robot */
     /* filled */

@@ -13,7 +13,7 @@ MildStatus report_text(const char *text, size_t size, const char *path, MildErro
  * stdout. */
 MildStatus report_save(cJSON *root, const char *path, MildError *error);
 
-/* Python scripts draw the figures from CSV files that the program writes. */
+/* ---- Python scripts draw the figures from CSV files that the program writes ---- */
 
 /* Runs a shipped script ("scripts/fit.py") with the arguments `data`, `picture` and, unless it is
  * NULL, `title`. Uses the Python of .venv, or else the system's. */

@@ -5,7 +5,6 @@
 
 #include "base/random.h"
 #include "identify/belief/file.h"
-#include "identify/belief/log.h"
 
 #define SHIPPED MILD_SOURCE_DIR "/" BELIEF_SHIPPED
 #define TWO_PI 6.283185307179586
