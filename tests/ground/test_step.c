@@ -264,7 +264,7 @@ TEST(test_load) {
     mild_sole_destroy(sole);
 }
 
-/* What a step reports of a foot: where the wrench acts, in world axes, with every sign. */
+/* ---- what a step reports of a foot: where the wrench acts, in world axes, with every sign ---- */
 
 /* A single element at (x, y) of the sole, the foot turned, tilted and shifted: all force acts at
  * that element's centre, wherever the ankle is. */
