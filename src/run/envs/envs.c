@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "run/config/experiment_keys.h"
-#include "run/train/envs.h"
+#include "run/train/experiment.h"
 
 struct MildEnvs {
     ExperimentDef def;

@@ -14,7 +14,7 @@
 void actions_print_header(FILE *csv, const TaskDef *task, const Robot *robot);
 void actions_print_row(FILE *csv, const EvalDecision *decision);
 
-/* What a learned controller computes inside during the trials: as a CSV, and as means. */
+/* ---- what a learned controller computes inside during the trials: as a CSV, and as means ---- */
 
 typedef struct {
     const LearnedInside *inside;

@@ -4,12 +4,15 @@
 
 #include <stdint.h>
 
+#include "env/actuator/actuator.h"
+#include "env/envs.h"
+#include "env/task/ground.h"
 #include "env/task/task_def.h"
 #include "env/task/terrain.h"
 #include "learn/ppo.h"
 #include "mild/field.h"
 
-/* Length and size of a training run: section [train] of a config. */
+/* ---- length and size of a training run: section [train] of a config ---- */
 
 enum { TRAIN_ROBOT_SIZE = 128, TRAIN_START_SIZE = 256 };
 
@@ -64,5 +67,20 @@ void experiment_fit_robot(ExperimentDef *def, const Robot *robot);
 
 /* Checks every range, and keys that must fit together. */
 MildStatus experiment_check(const ExperimentDef *def, MildError *error);
+
+/* ---- the environments of a run, as its config describes them ---- */
+
+typedef struct {
+    Envs *envs;
+    MildMap *map;       /* of the terrain; NULL: level ground */
+    Actuator *actuator; /* NULL: the joints' PD */
+    TaskSoils soils;    /* of randomize.presets */
+} TrainEnvs;
+
+/* count: environments of this process, with numbers from `first`. Sets the map, imprints, motors
+ * and soils of def->task, which the environments borrow. Close it after a failure too. */
+MildStatus train_envs_open(TrainEnvs *envs, ExperimentDef *def, const Robot *robot, Pool *pool,
+                           int count, int first, MildError *error);
+void train_envs_close(TrainEnvs *envs);
 
 #endif
