@@ -25,7 +25,7 @@ static inline double kit_spread(uint64_t *state, double low, double high) {
     return exp(kit_uniform(state, log(low), log(high)));
 }
 
-/* Numbers rounded to float, for tests that compare float with double arithmetic. */
+/* ---- numbers rounded to float, for tests that compare float with double arithmetic ---- */
 
 static inline void kit_round(double *x, size_t count) {
     for (size_t i = 0; i < count; i++) {

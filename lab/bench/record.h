@@ -6,7 +6,7 @@
 #include "robot/robot.h"
 #include "run/train/experiment.h"
 
-/* A recorded walk. Each policy period can be stepped again from the same state. */
+/* ---- a recorded walk. Each policy period can be stepped again from the same state ---- */
 
 enum { REPLAY_STEPS_MAX = 100 }; /* physics steps of a period */
 

@@ -629,7 +629,7 @@ void robot_engine_qpos(const Robot *robot, const double *qpos, double *engine) {
     }
 }
 
-/* Robots by name: the folders under robots/ that ship with the program. */
+/* ---- robots by name: the folders under robots/ that ship with the program ---- */
 
 static int compare_names(const void *a, const void *b) {
     return strcmp(a, b);

@@ -99,7 +99,7 @@ TEST(test_neighbours) {
     }
 }
 
-/* Student's t against an integral of the density that shares no formula with it. */
+/* ---- Student's t against an integral of the density that shares no formula with it ---- */
 
 /* The density integrated by Simpson's rule from 0 to t, over that from 0 to infinity: 0.95. With
  * t = sqrt(n) tan(a) the density is cos(a)^(n-1), up to a constant. */

@@ -75,7 +75,7 @@ static inline double quantile(double *errors, int count, double share) {
     return errors[(int)(share * (count - 1))];
 }
 
-/* The law of a material under a sole, as a case of the batch's ground has it. */
+/* ---- the law of a material under a sole, as a case of the batch's ground has it ---- */
 
 static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
     const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));

@@ -246,7 +246,7 @@ TEST(patterns_have_colours) {
     hide(&shown);
 }
 
-/* The ground changes while it runs. */
+/* ---- the ground changes while it runs ---- */
 
 #define PLATE                                                                                      \
     "<worldbody><body name='plate' pos='0 0 0.02'><freejoint/><geom type='box' size='.1 .05 .01' " \

@@ -137,7 +137,7 @@ TEST(odd_size_is_refused) {
     assert_null(video_open("x.mp4", 96, 64, 0, &error));
 }
 
-/* Edges of a picture that was drawn with one sample per pixel. */
+/* ---- edges of a picture that was drawn with one sample per pixel ---- */
 
 #define SAMPLES 16 /* of a side of a pixel, in the reference */
 
@@ -228,7 +228,7 @@ TEST(lines_stay) {
     }
 }
 
-/* The camera's filter: by time and not by frames, and not behind what moves evenly. */
+/* ---- the camera's filter: by time and not by frames, and not behind what moves evenly ---- */
 
 #define LAG 0.4
 #define SPEED 0.6

@@ -198,7 +198,7 @@ TEST(a_share_of_the_torque) {
     runner_destroy(runner);
 }
 
-/* Who the runner listens to: greetings, strangers, other sessions, garbage. */
+/* ---- who the runner listens to: greetings, strangers, other sessions, garbage ---- */
 
 /* Nothing is sent before five good states in a row, and until the robot has answered no more
  * packets than it sent, which have no stiffness. */

@@ -24,7 +24,7 @@ MildStatus export_onnx(const Export *export, const char *path, MildError *error)
  * Fails when the folder exists. */
 MildStatus export_c(const Export *export, const char *folder, MildError *error);
 
-/* What a program must know beside the networks' weights, as texts. */
+/* ---- what a program must know beside the networks' weights, as texts ---- */
 
 enum {
     DESCRIBE_MAX = 40,

@@ -299,7 +299,7 @@ MildStatus batch_bodies_end(const MildBatch *batch, const MildBatchInput *input,
     return MILD_OK;
 }
 
-/* What the ground under the shells of a batch remembers, from and to mild/ground.h. */
+/* ---- what the ground under the shells of a batch remembers, from and to mild/ground.h ---- */
 
 /* The state of bodies.h for a material of ground/step/state.h. */
 static int state_of(int32_t material) {
