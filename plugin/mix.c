@@ -1,4 +1,4 @@
-#include "plugin/mix.h"
+#include "plugin/soft.h"
 
 #include <math.h>
 #include <string.h>

@@ -9,9 +9,9 @@
 #include "contact_case.h"
 #include "ground/law/begin.h"
 #include "ground/law/models.h"
-#include "ground/map_kit.h"
 #include "ground/step/scratch.h"
 #include "ground/step/state.h"
+#include "ground/surface_kit.h"
 #include "ground/terrain/grid.h"
 
 /* The map of a kit. Its labels must live as long as the case. */

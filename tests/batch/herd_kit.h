@@ -3,7 +3,6 @@
 #define HERD_KIT_H
 
 #include "batch_kit.h"
-#include "ground/map_kit.h"
 #include "ground/surface_kit.h"
 
 enum { ROBOTS = 48, STEPS = 30, MATERIALS = 12, LABELS = 3, ROWS = 6 * MILD_FEET_MAX };

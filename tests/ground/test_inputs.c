@@ -2,7 +2,6 @@
 #include "ground_kit.h"
 
 #include "draws.h"
-#include "map_kit.h"
 #include "surface_kit.h"
 
 TEST(test_material_refused) {

@@ -1,5 +1,5 @@
 /* Height maps and patterns against their formulas. */
-#include "map_kit.h"
+#include "surface_kit.h"
 
 #include "ground/terrain/grid.h"
 #include "ground/terrain/map_view.h"

@@ -1,5 +1,5 @@
 /* Contact on uneven ground: which elements are found and how deep, friction on a slope, energy. */
-#include "map_kit.h"
+#include "surface_kit.h"
 
 /* 6 mm above the ground an element that gets there within the step is found, however it does: by
  * falling, by sliding uphill along either axis, by tilting, by turning uphill. 16 m/s are 8 mm in

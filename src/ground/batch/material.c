@@ -1,4 +1,4 @@
-#include "ground/batch/material.h"
+#include "ground/batch/batch.h"
 
 #include <stdlib.h>
 #include <string.h>
