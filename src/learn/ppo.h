@@ -66,7 +66,7 @@ MildStatus ppo_save_learner(const Ppo *ppo, const char *path, const void *kept, 
                             const char *note, MildError *error);
 MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_size, int *found,
                             MildError *error);
-/* *whole: bool, it is a file of ppo_save, not of ppo_save_learner. Fails where it cannot be read. */
+/* *whole: bool, the file is ppo_save's, not ppo_save_learner's. Fails where it cannot be read. */
 MildStatus ppo_file_is_whole(const char *path, int *whole, MildError *error);
 
 #endif

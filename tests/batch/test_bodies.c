@@ -1,8 +1,8 @@
 /* The step of a robot whose shells are near the ground (bodies.h) against mild_ground_solve and
  * mild_ground_advance: the same code in double and in float, of soles and shells, on level ground
  * and on maps. */
-#include "contact_case.h"
 #include "case_kit.h"
+#include "contact_case.h"
 #include "ground/sole/sole.h"
 #include "ground/surface_kit.h"
 

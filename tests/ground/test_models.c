@@ -47,8 +47,8 @@ static MildMaterial rival_of(int model, const MildMaterial *mild) {
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
- * the elastic travel belongs to its greatest coefficient (src/ground/models/resist.c). 7 um: 0.4 %
- * of the force at 1.9 mm. */
+ * the elastic travel belongs to its greatest coefficient (src/ground/models/model_resist.c).
+ * 7 um: 0.4 % of the force at 1.9 mm. */
 #define RESIST_LEAD (ELEMENT_ELASTIC * (1.0 - 1.0 / RESIST_PEAK))
 
 #define PRESS_SPEED 0.01 /* [m/s] */

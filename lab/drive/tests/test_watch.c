@@ -6,8 +6,8 @@
 #include "run/config/experiment_keys.h"
 #include "run/eval/scene.h"
 
-/* ---- a robot that walks in MuJoCo under a runner, packet by packet, in its own time: with noise and
- * the latencies of training, with pushes, and with a sensor that lies from some time on ---- */
+/* ---- a robot that walks in MuJoCo under a runner, packet by packet, in its own time: with noise
+ * and latencies of training, with pushes, and with a sensor that lies from some time on ---- */
 
 #define PUSH_EVERY 4.0 /* [s] */
 #define TIP                                                                                        \

@@ -47,7 +47,7 @@
  * vector loops, so a curve costs nothing on ground that does not have it. law_variant says which
  * loop serves a foot; for a loop of the new curve alone, add it there and to the switches of
  * pass.c and prepare.c. Look at element_drag's callers (prepare.c, contact.inc) if the
- * curve has a drag, and at resist.c if a resistive force may be blended with it. */
+ * curve has a drag, and at model_resist.c if a resistive force may be blended with it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 

@@ -104,9 +104,9 @@ static double outline_mean(const MildSoleDef *def, const Outline *outline, doubl
     return sum / outline->area;
 }
 
-/* Mean and standard deviation of the distance from the edge over the n cells about (x, y) [m]. Cells cover more
- * or less than the outline, and each counts whole: so the distances are scaled to the mean over the
- * outline. work: [points] scratch space. */
+/* Mean and standard deviation of the distance from the edge over the n cells about (x, y) [m].
+ * Cells cover more or less than the outline, and each counts whole: so the distances are scaled to
+ * the mean over the outline. work: [points] scratch space. */
 static void sole_edges(const MildSoleDef *def, const Outline *outline, int n, const double *x,
                        const double *y, double *edge, double *spread, int *work) {
     double sum = 0.0;

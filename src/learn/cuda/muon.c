@@ -29,8 +29,8 @@ size_t gpu_muon_carve(char *block, GpuMuon *muon) {
     return 2 * (x + square) * sizeof *at;
 }
 
-/* c [side][n] = a op(b) for each matrix, row-major, a [side][k]; see product in network.c. bf16 has no
- * floats to multiply but rounded to TF32. */
+/* c [side][n] = a op(b) for each matrix, row-major, a [side][k]; see product in network.c. bf16 has
+ * no floats to multiply but rounded to TF32. */
 static void product(GpuLearner *g, char transpose_b, int n, int k, const float *a, const float *b,
                     float *c) {
     GpuQueue *q = &g->queue;
