@@ -3,8 +3,9 @@
 
     scripts/public_policies.py --list                  # what to clone, and where
     scripts/public_policies.py CLONES --out out/public # CLONES/REPOSITORY for each; a table and a JSON for each policy
+    scripts/public_policies.py CLONES --out out/public --sweep stiffness,friction # S50 of each
 
-Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again."""
+Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again; a sweep goes on from it."""
 import argparse
 import csv
 import json
@@ -55,14 +56,14 @@ def show():
         print(f"git clone https://github.com/{place} {folder} && git -C {folder} checkout -q {commit}    # {licence}")
 
 
-def run(clones, out, name, options):
+def run(clones, out, name, options, sweep=None):
     """The JSON of one policy."""
-    target = out / f"{name}.json"
-    if not target.is_file():
+    target = out / (f"{name}-{sweep}.json" if sweep else f"{name}.json")
+    if sweep or not target.is_file():
         _, model, policy = POLICIES[name]
         policy = policy if policy.startswith("/") else str(clones / policy)
         subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, "--describe", str(ROOT / f"examples/trial/{name}.ini"),
-                        "--json", str(target), *options], check=True)
+                        "--json", str(target), *(["--sweep", sweep] if sweep else []), *options], check=True)
     return json.loads(target.read_text())
 
 
@@ -90,20 +91,50 @@ def write_csv(path, tables):
                                  f"{row['torque']:.1f}", mean(row, "sinkage", False), f"{times[len(times) // 2]:.2f}" if times else ""])
 
 
+def s50(found):
+    """S50 of a sweep with its interval."""
+    first, last = (f"{value:.3g}" for value in found["range"])
+    low, high = ("" if value is None else f"{value:.3g}" for value in found["interval"])
+    if found["verdict"] in ("never_falls", "always_falls"):
+        return f"< {high}" if high else f"> {low}" if low else found["verdict"].replace("_", " ")
+    middle = "-" if found["s50"] is None else f"{found['s50']:.3g}"
+    return f"{middle} ({low or 'below ' + first} to {high or 'above ' + last})"
+
+
+def run_sweeps(clones, arguments, options):
+    """A table of S50, and its CSV."""
+    sweeps, rows = arguments.sweep.split(","), []
+    print("| policy | " + " | ".join(sweeps) + " |", "|---" * (len(sweeps) + 1) + "|", sep="\n")
+    for name in arguments.only.split(","):
+        found = [run(clones, arguments.out, name, options, sweep) for sweep in sweeps]
+        rows += [[name, one["sweep"], one["unit"], one["verdict"], one["s50"], *one["interval"], one["trials"],
+                  sum(walk["end"] == "time" for walk in one["each"])] for one in found]
+        print(f"| {name} | " + " | ".join(map(s50, found)) + " |", flush=True)
+    if arguments.csv:
+        with open(arguments.csv, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["policy", "sweep", "unit", "verdict", "S50", "low", "high", "trials", "upright"])
+            writer.writerows([[f"{value:.4g}" if isinstance(value, float) else value for value in row] for row in rows])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clones", nargs="?", type=pathlib.Path)
     parser.add_argument("--list", action="store_true", help="print what to clone")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/public"))
     parser.add_argument("--only", default=",".join(POLICIES), help="names, separated by commas")
-    parser.add_argument("--options", default="--trials 10 --seconds 20 --speed 0.5", help="of mild trial")
+    parser.add_argument("--sweep", help="of mild trial, separated by commas: S50 in the place of the nine grounds")
+    parser.add_argument("--options", help="of mild trial (default --seconds 20 --speed 0.5, and --trials 10 without a sweep)")
     parser.add_argument("--csv", type=pathlib.Path, help="also write every cell, with cost, torque and sinkage")
     arguments = parser.parse_args()
     if arguments.list or not arguments.clones:
         show()
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
-    tables = {name: run(arguments.clones, arguments.out, name, arguments.options.split()) for name in arguments.only.split(",")}
+    options = (arguments.options or f"--seconds 20 --speed 0.5{'' if arguments.sweep else ' --trials 10'}").split()
+    if arguments.sweep:
+        return run_sweeps(arguments.clones, arguments, options)
+    tables = {name: run(arguments.clones, arguments.out, name, options) for name in arguments.only.split(",")}
     if arguments.csv:
         write_csv(arguments.csv, tables)
     lines = []

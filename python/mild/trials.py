@@ -456,7 +456,8 @@ def _list(read):
 EXAMPLES = """examples:
   mild trial robot.xml policy.onnx --describe mine.ini --check
   mild trial robot.xml policy.pt --describe unitree_rl_gym --set policy.decimation=4 --ground rigid,grass
-  mild trial robot.xml mine.py:Policy --describe mine.ini --speed 0.3,0.6 --attach ground.mu=0.5 --video walk.mp4"""
+  mild trial robot.xml mine.py:Policy --describe mine.ini --speed 0.3,0.6 --attach ground.mu=0.5 --video walk.mp4
+  mild trial robot.xml policy.onnx --describe mine.ini --sweep stiffness --json s50.json --plot s50.png"""
 
 
 def parser():
@@ -469,7 +470,7 @@ def parser():
     p.add_argument("--speed", type=_list(float), default=[0.5], metavar="V[,V]", help="[m/s] forward (default 0.5)")
     p.add_argument("--sideways", type=float, default=0.0, metavar="V", help="[m/s] to the left")
     p.add_argument("--turn", type=float, default=0.0, metavar="W", help="[rad/s] to the left")
-    p.add_argument("--trials", type=int, default=10, metavar="N", help="of each row (default 10)")
+    p.add_argument("--trials", type=int, metavar="N", help="of each row (default 10); of a sweep, at most (default 60)")
     p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="of a trial (default 10)")
     p.add_argument("--seed", type=int, default=1, metavar="N", help="of the first trial of each row (default 1)")
     p.add_argument("--noise", type=float, default=1.0, metavar="X", help="times the noise of the description; 0: none (default 1)")
@@ -478,6 +479,11 @@ def parser():
     p.add_argument("--attach", action="append", default=[], metavar="KEY=VALUE", help="an attribute of the ground, such as ground.mu=0.8")
     p.add_argument("--video", metavar="FILE", help="the first trial of each row, by MuJoCo's renderer and ffmpeg")
     p.add_argument("--json", metavar="FILE", help="also write the table as JSON; - for standard output")
+    p.add_argument("--sweep", metavar="WHAT", help="one number instead: the stiffness [MPa/m], friction, slip length [mm] or damping [s/m] of the ground at "
+                   "which half of the trials stay up: stiffness, friction, slip, damping; --json FILE is whole after every trial, and a sweep goes on from it")
+    p.add_argument("--range", type=_list(float), metavar="LOW,HIGH", help="of a sweep")
+    p.add_argument("--csv", metavar="FILE", help="also write the curve of a sweep: value, trials, upright, chance to stay up")
+    p.add_argument("--plot", metavar="FILE", help="draw the curve of a sweep, measured grounds on its axis; needs matplotlib")
     p.add_argument("--keys", action="store_true", help="print the keys of a description")
     p.add_argument("--check", action="store_true", help="print what the description makes of the model, without a walk")
     return p
@@ -544,9 +550,14 @@ def main(argv=None):
         if arguments.video:
             os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it once, when it is imported
         _quietly()
+        if arguments.sweep:
+            from . import sweep
+
+            sweep.run(arguments, changes, attributes)
+            return 0
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, ground=arguments.ground, speeds=arguments.speed,
-                      sideways=arguments.sideways, turn=arguments.turn, trials=arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
+                      sideways=arguments.sideways, turn=arguments.turn, trials=10 if arguments.trials is None else arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
                       noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
         print(table, file=out)
         if table.about["remark"]:

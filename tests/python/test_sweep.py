@@ -1,0 +1,234 @@
+"""mild trial --sweep: the estimator on known curves, the ground that it makes, files that it goes on from, and the command."""
+import copy
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+import numpy as np
+
+import mild
+from mild import sweep
+from mild.sweep import Curve
+from test_trial import ROOT, Command, biped
+
+PLUGIN = os.environ.get("MILD_PLUGIN", "")
+
+
+def chance(value, s50, b, e=0.0):
+    return e + (1 - 2 * e) / (1 + (s50 / value) ** b)
+
+
+def judge(curve, truth, random, most=60):
+    """A sweep of a known curve; (verdict, S50, interval, trials)."""
+    curve, each = copy.copy(curve), 0
+    while each < most and (not each or curve.result()[0] == "open"):
+        for value in curve.choose(4) if each else curve.values[np.linspace(0, len(curve.values) - 1, 4).round().astype(int)]:
+            curve.add(value, random.random() < truth(value))
+            each += 1
+    return *curve.result(), each
+
+
+class Estimator(unittest.TestCase):
+    def test_coverage(self):
+        """Of 90 simulated policies, shallow and steep, some of which fall by accident, the 90 % intervals hold 78 to 89 true values of S50.
+        Steep ones are known to within the factor after 30 trials on average."""
+        random, curve, held, errors, steep = np.random.default_rng(70), Curve(1, 30), 0, [], []
+        for k in range(90):
+            s50, b, e = np.exp(random.uniform(np.log(3), np.log(10))), (2, 6, 20)[k % 3], (0, 0.05)[k // 3 % 2]
+            _, middle, (low, high), each = judge(curve, lambda value: chance(value, s50, b, e), random)
+            held += (low or 0) <= s50 <= (high or np.inf)
+            errors.append(np.log(middle / s50))
+            if b == 20:
+                self.assertLessEqual(high / low, sweep.WITHIN)
+                steep.append(each)
+        print(f"{held} of 90 held; median error {np.median(np.abs(errors)):.3f}, bias {np.mean(errors):+.3f}; steep: {np.mean(steep):.1f} trials")
+        self.assertTrue(78 <= held <= 89, held)
+        self.assertLess(abs(np.mean(errors)), 0.04)
+        self.assertLess(np.median(np.abs(errors)), 0.12)
+        self.assertLess(np.mean(steep), 30)
+
+    def test_ends(self):
+        """Who never falls, and who always falls, is known after 20 trials, with one bound; so is who falls beyond the range."""
+        random, curve = np.random.default_rng(1), Curve(1, 100)
+        for truth, verdict, bounds in ((lambda value: 1.0, "never_falls", (None, 1.0)), (lambda value: 0.0, "always_falls", (100.0, None)),
+                                       (lambda value: chance(value, 0.4, 10), "never_falls", (None, 1.0)),
+                                       (lambda value: chance(value, 250, 10), "always_falls", (100.0, None))):
+            found, s50, interval, each = judge(curve, truth, random)
+            self.assertEqual((found, s50, np.round([one or 0 for one in interval], 9).tolist()), (verdict, None, [one or 0 for one in bounds]))
+            self.assertLessEqual(each, 20)
+
+    def test_border(self):
+        """S50 at the end of the range: no bound beyond it, whatever the estimate."""
+        _, _, (low, high), _ = judge(Curve(1, 100), lambda value: chance(value, 1.0, 3), np.random.default_rng(3))
+        self.assertIsNone(low)
+        self.assertTrue(1 <= high < 4, high)
+
+    def test_direction(self):
+        """Where nobody knows which end is hard, both are found; one who never falls has no bound."""
+        random, curve = np.random.default_rng(2), Curve(1, 100, rises=0)
+        for b in (15, -15):
+            verdict, s50, (low, high), _ = judge(curve, lambda value: chance(value, 8.0, b), random)
+            self.assertEqual(verdict, "inside")
+            self.assertTrue(low <= 8 <= high and abs(np.log(s50 / 8)) < 0.2, (low, s50, high))
+        self.assertEqual(judge(curve, lambda value: 1.0, random)[:3], ("never_falls", None, (None, None)))
+
+    def test_fit(self):
+        """The chance to stay up at a value, and its interval, are those of the trials there: 24 of 40."""
+        curve = Curve(1, 100)
+        for k in range(40):
+            for value, upright in ((1, False), (10, k < 24), (100, True)):
+                curve.add(value, upright)
+        mean, low, high = curve.fit()[:, 40]
+        self.assertTrue(0.43 < low < 0.53 and 0.67 < high < 0.77 and abs(mean - 0.6) < 0.03, (low, mean, high))
+
+
+class Ground(unittest.TestCase):
+    def test_stiffness(self):
+        """Under any pressure a plate sinks by pressure over stiffness; the rest is the tile's."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        area = sweep.CELL * len(sole.x)
+        for value in (0.1, 0.7, 5, 40, 1000):
+            for pressure in (2e3, 4e4):
+                self.assertAlmostEqual(sole.sinkage(sweep.material("stiffness", "rubber_tile", value), pressure * area), 1e-6 * pressure / value,
+                                       delta=2e-3 * 1e-6 * pressure / value)
+        made, tile = sweep.material("stiffness", "rubber_tile", 3.0).as_dict(), mild.Material("rubber_tile").as_dict()
+        self.assertEqual({key for key in tile if made[key] != tile[key]}, {"k_pen", "sigma_cone", "bed_depth"})
+
+    def test_others(self):
+        """Each other sweep sets what it says."""
+        self.assertEqual(sweep.material("friction", "rubber_tile", 0.3).mu, 0.3)
+        self.assertAlmostEqual(sweep.material("slip", "rubber_tile", 2.0).slip_length, 0.002)
+        damped = sweep.material("damping", "rubber_tile", 0.7)
+        self.assertEqual((damped.model, damped.dissipation, damped.k_pen), ("hunt_crossley", 0.7, mild.Material("rubber_tile").k_pen))
+
+    def test_marks(self):
+        """The grounds on the axis have the stiffness and the friction that `mild info grounds` prints."""
+        text = subprocess.run([os.environ["MILD_PROGRAM"], "info", "grounds"], capture_output=True, text=True, check=True).stdout
+        printed = {row[0]: row[1:] for row in re.findall(r"^  (\w+) +mild\w* +([\d.]+) +[\d.]+ +\d+ +([\d.]+) ", text, re.M)}
+        stiffness, friction = sweep.marks("stiffness"), sweep.marks("friction")
+        self.assertEqual(set(stiffness), set(sweep.MEASURED))
+        for name in sweep.MEASURED:
+            self.assertAlmostEqual(stiffness[name], float(printed[name][0]), delta=0.02 * stiffness[name])
+            self.assertAlmostEqual(friction[name], float(printed[name][1]), delta=0.005)
+
+
+def walk(arguments):
+    """In the place of a trial: stays up as a curve with S50 3 says."""
+    *_, value, seed = arguments
+    upright = np.random.default_rng([seed, 7]).random() < chance(value, 3.0, 12)
+    return {"value": value, "seed": seed, "time": 1.0, "end": "time" if upright else "tilt", "speed": None, "sideways": None, "cost": None, "torque": 1.0,
+            "sinkage": None}
+
+
+class Stop(Exception):
+    pass
+
+
+@unittest.mock.patch.object(sweep, "_walk", walk)
+class Files(unittest.TestCase):
+    def run_sweep(self, file, stop=None, **more):
+        def report(result):
+            if stop is not None and len(result.each) == stop:
+                raise Stop
+
+        return sweep.sweep("robot.xml", "policy.onnx", "mine.ini", "stiffness", file=file, report=report, **more)
+
+    def test_goes_on(self):
+        """Interrupted anywhere, even where a round is not done, a sweep leaves a whole file, and goes on to the very same one."""
+        with tempfile.TemporaryDirectory() as folder:
+            whole, part = (os.path.join(folder, name) for name in ("whole.json", "part.json"))
+            self.run_sweep(whole)
+            wanted = pathlib.Path(whole).read_text()
+            count = len(json.loads(wanted)["each"])
+            for stop in (1, 3, 4, 9, count - 1):
+                with self.assertRaises(Stop):
+                    self.run_sweep(part, stop)
+                self.assertEqual(json.loads(pathlib.Path(part).read_text())["each"], json.loads(wanted)["each"][:stop])
+                with unittest.mock.patch.object(sweep, "_walk", side_effect=walk) as walked:
+                    self.run_sweep(part)
+                self.assertEqual((pathlib.Path(part).read_text(), walked.call_count), (wanted, count - stop))
+                pathlib.Path(part).unlink()
+            self.run_sweep(whole, most=5)  # fewer than are there: nothing is lost
+            self.assertEqual(pathlib.Path(whole).read_text(), wanted)
+            self.assertEqual(sorted(os.listdir(folder)), ["whole.json"])
+
+    def test_most(self):
+        """A sweep that ended without an answer goes on with more trials, to what it would have found at once."""
+        with tempfile.TemporaryDirectory() as folder:
+            part, whole = (os.path.join(folder, name) for name in ("part.json", "whole.json"))
+            result = self.run_sweep(part, most=10)
+            self.assertEqual((result.as_dict()["verdict"], len(result.each)), ("open", 10))
+            self.assertIn("wider than a factor 1.3", str(result))
+            self.run_sweep(part), self.run_sweep(whole)
+            self.assertEqual(pathlib.Path(part).read_text(), pathlib.Path(whole).read_text())
+
+    def test_other(self):
+        """The file of another sweep, of none, and one whose trials were changed are refused, and stay."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "s50.json"
+            self.run_sweep(file, most=8)
+            kept = file.read_text()
+            with self.assertRaisesRegex(ValueError, "seed 1 instead of 2"):
+                self.run_sweep(file, seed=2)
+            for wrong, line in (("{}", "is no sweep"), ('{"each": [', "is no sweep"), (kept.replace('"value": 0.1,', '"value": 0.2,'), "would not choose")):
+                file.write_text(wrong)
+                with self.assertRaisesRegex(ValueError, line):
+                    self.run_sweep(file)
+                self.assertEqual(file.read_text(), wrong)
+
+    def test_seeds(self):
+        """Trials have seeds of their own, and another seed finds the same S50 by other trials."""
+        first, second = self.run_sweep(None), self.run_sweep(None, seed=1000)
+        self.assertEqual([one["seed"] for one in first.each], list(range(1, 1 + len(first.each))))
+        self.assertNotEqual([one["value"] for one in first.each], [one["value"] for one in second.each])
+        for result in (first, second):
+            _, _, (low, high) = result.curve.result()
+            self.assertTrue(low <= 3 <= high and high / low <= sweep.WITHIN)
+
+
+class Commands(unittest.TestCase):
+    run_main = Command.run_main
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_command(self):
+        """One line; JSON that fits its schema and does not depend on processes; CSV; each fault is one line and 2."""
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            (folder / "robot.xml").write_text(biped())
+            (folder / "mine.py").write_text("import numpy as np\ndef still(o):\n    return np.zeros(4)\n")
+            (folder / "mine.ini").write_text("[policy]\ndecimation = 5\n[observation]\ngravity = 1\n[kp]\n.* = 400\n[kd]\n.* = 8\n")
+            sweeping = (folder / "robot.xml", f"{folder}/mine.py:still", "--describe", folder / "mine.ini", "--sweep")
+            for jobs in (1, 2):
+                status, out, error = self.run_main(*sweeping, "stiffness", "--seconds", "0.2", "--jobs", jobs, "--json", folder / f"{jobs}.json", "--csv",
+                                                   folder / "curve.csv")
+                self.assertEqual((status, error), (0, ""))
+                self.assertRegex(out, r"^stiffness S50 < 0.1 MPa/m: it never falls from 0.1 to 1e\+03; (\d+) of \1 trials upright\n$")
+            self.assertEqual((folder / "1.json").read_text(), (folder / "2.json").read_text())
+            subprocess.run([sys.executable, ROOT / "tests/app/schema.py", ROOT / "docs/schema/sweep.json", folder / "1.json"], check=True)
+            rows = [line.split(",") for line in (folder / "curve.csv").read_text().splitlines()]
+            self.assertEqual((rows[0], len(rows)), (["value", "trials", "upright", "chance", "low", "high"], 162))
+            self.assertEqual(sum(int(row[1]) for row in rows[1:]), len(json.loads((folder / "1.json").read_text())["each"]))
+            try:
+                import matplotlib  # noqa: F401
+            except ImportError:
+                pass
+            else:
+                self.run_main(*sweeping, "stiffness", "--seconds", "0.2", "--json", folder / "1.json", "--plot", folder / "curve.png")
+                self.assertGreater((folder / "curve.png").stat().st_size, 10000)
+            for more, line in ((("wind",), "'wind' is none of stiffness, friction"), (("slip", "--range", "3,1"), "0 < low < high"),
+                               (("slip", "--range", "3"), "--range LOW,HIGH"), (("friction", "--range", "0.1,9"), "mu"), (("friction", "--trials", 0), "more than 0"),
+                               (("friction", "--ground", "rigid"), "one soft ground"), (("friction", "--speed", "0,1"), "one speed"),
+                               (("friction", "--ground", "soup"), "soup"), (("friction", "--attach", "ground.mu=1"), "ground.mu is what the sweep sets")):
+                status, _, error = self.run_main(*sweeping, *more)
+                self.assertEqual((status, error.count("\n"), error.startswith("mild trial: ")), (2, 1, True), error)
+                self.assertIn(line, error)
+
+
+if __name__ == "__main__":
+    unittest.main()
