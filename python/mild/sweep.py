@@ -17,7 +17,6 @@ from .describe import Description
 CELL = 0.0195**2  # [m^2] of an element for which presets give k_pen
 PRESSURE = 6.7e3  # [Pa] at which `mild info grounds` gives the stiffness of a preset
 MEASURED = ("rubber_tile", "running_track", "artificial_turf", "gym_mat", "carpet", "groomed_snow", "moist_sand", "dry_sand_close", "dry_sand_loose")
-GROUND = "rubber_tile"  # has all numbers that a sweep does not set
 PER_DECADE = 40  # places of the grid, 6 % apart
 ROUND = 4  # trials that are chosen at once; a round does not depend on the number of processes
 PRIOR = 0.5  # exponent: shallow curves are taken for likelier
@@ -31,6 +30,7 @@ class Quantity:
     low: float
     high: float
     rises: int  # 1: more of it keeps robots up; 0: nobody knows
+    ground: str  # preset that has all other numbers, where none is named
     fields: object  # value -> fields of a Material
 
 
@@ -41,10 +41,10 @@ def _straight(value):
 
 
 QUANTITIES = {
-    "stiffness": Quantity("MPa/m", 0.1, 1000.0, 1, _straight),
-    "friction": Quantity("-", 0.02, 2.0, 1, lambda value: {"mu": value}),
-    "slip": Quantity("mm", 0.1, 100.0, 1, lambda value: {"slip_length": 1e-3 * value, "recovery": 0.0, "grip": 0.0}),
-    "damping": Quantity("s/m", 0.01, 30.0, 0, lambda value: {"model": "hunt_crossley", "exponent": 1.0, "dissipation": value}),
+    "stiffness": Quantity("MPa/m", 0.1, 1000.0, 1, "rubber_tile", _straight),
+    "friction": Quantity("-", 0.02, 2.0, 1, "rubber_tile", lambda value: {"mu": value}),
+    "slip": Quantity("mm", 0.1, 100.0, 1, "sand_dense", lambda value: {"slip_length": 1e-3 * value, "recovery": 0.0}),
+    "damping": Quantity("s/m", 0.01, 10.0, 0, "gym_mat", lambda value: {"model": "hunt_crossley", "exponent": 1.0, "dissipation": value}),
 }
 
 
@@ -76,7 +76,7 @@ class Curve:
     method of Kontsevich and Tyler 1999, b and e as Prins 2013). rises: 1, b > 0; 0, either sign. S50 may be outside low .. high."""
 
     def __init__(self, low, high, rises=1):
-        steps, beyond = round(PER_DECADE * np.log10(high / low)), PER_DECADE // 2
+        steps, beyond = max(ROUND, round(PER_DECADE * np.log10(high / low))), PER_DECADE // 2
         self.values = np.geomspace(low, high, steps + 1)
         step = np.log(high / low) / steps
         self.s50 = np.log(low) + step * np.arange(-beyond, steps + 1 + beyond)
@@ -236,18 +236,18 @@ def _recorded(path, about):
     return found["each"]
 
 
-def sweep(model, policy, describe, quantity, *, ground=GROUND, limits=None, command=(0.5, 0.0, 0.0), most=60, seconds=10.0, seed=1, noise=1.0,
+def sweep(model, policy, describe, quantity, *, ground=None, limits=None, command=(0.5, 0.0, 0.0), most=60, seconds=10.0, seed=1, noise=1.0,
           changes=None, attributes=None, jobs=1, file=None, report=None):
     """Finds the value of a quantity at which half of the trials stay up. Returns a Sweep.
 
     model, policy, describe: files, as in mild.trial. quantity: stiffness, friction, slip, damping. ground: the preset that has all
-    numbers but those of the sweep. limits: (low, high) [unit of the quantity]. most: number of trials at most. file: JSON, whole after
+    numbers but those of the sweep; None: QUANTITIES names it. limits: (low, high) [unit of the quantity]. most: number of trials at most. file: JSON, whole after
     every trial; a sweep that finds its own file goes on from there. report: called with the Sweep after every trial. The result does
     not depend on jobs, nor on interruptions. Other arguments, errors: mild.trial."""
     if quantity not in QUANTITIES:
         raise ValueError(f"sweep: '{quantity}' is none of {', '.join(QUANTITIES)}")
     q = QUANTITIES[quantity]
-    low, high = limits or (q.low, q.high)
+    ground, (low, high) = ground or q.ground, limits or (q.low, q.high)
     attributes, changes = dict(attributes or {}), dict(changes or {})
     if not 0 < low < high or most < 1 or not seconds > 0:
         raise ValueError("sweep: needs 0 < low < high, and more than 0 trials and seconds")
@@ -302,7 +302,7 @@ def _save(file, result):
 
 def run(arguments, changes, attributes):
     """The command: the arguments of mild.trials.parser."""
-    grounds = arguments.ground if arguments.ground != list(trials.GROUNDS) else [GROUND]
+    grounds = arguments.ground if arguments.ground != list(trials.GROUNDS) else [None]
     if len(grounds) != 1 or grounds == ["rigid"] or len(arguments.speed) != 1 or arguments.video or len(arguments.range or (0, 1)) != 2:
         raise ValueError("sweep: takes one soft ground, one speed, --range LOW,HIGH, and no video")
     whole = arguments.json if arguments.json != "-" else None

@@ -62,6 +62,10 @@ class Estimator(unittest.TestCase):
             found, s50, interval, each = judge(curve, truth, random)
             self.assertEqual((found, s50, np.round([one or 0 for one in interval], 9).tolist()), (verdict, None, [one or 0 for one in bounds]))
             self.assertLessEqual(each, 20)
+        early = copy.copy(curve)
+        for value in (1, 5, 20, 100, 1):
+            early.add(value, True)
+        self.assertEqual(early.result()[:2], ("open", None))  # two at the low end are not enough
 
     def test_border(self):
         """S50 at the end of the range: no bound beyond it, whatever the estimate."""
@@ -103,7 +107,8 @@ class Ground(unittest.TestCase):
     def test_others(self):
         """Each other sweep sets what it says."""
         self.assertEqual(sweep.material("friction", "rubber_tile", 0.3).mu, 0.3)
-        self.assertAlmostEqual(sweep.material("slip", "rubber_tile", 2.0).slip_length, 0.002)
+        slips = sweep.material("slip", "rubber_tile", 2.0)
+        self.assertEqual((round(slips.slip_length, 9), slips.recovery, slips.mu), (0.002, 0, mild.Material("rubber_tile").mu))
         damped = sweep.material("damping", "rubber_tile", 0.7)
         self.assertEqual((damped.model, damped.dissipation, damped.k_pen), ("hunt_crossley", 0.7, mild.Material("rubber_tile").k_pen))
 
@@ -210,6 +215,7 @@ class Commands(unittest.TestCase):
                 self.assertEqual((status, error), (0, ""))
                 self.assertRegex(out, r"^stiffness S50 < 0.1 MPa/m: it never falls from 0.1 to 1e\+03; (\d+) of \1 trials upright\n$")
             self.assertEqual((folder / "1.json").read_text(), (folder / "2.json").read_text())
+            self.assertEqual(json.loads((folder / "1.json").read_text())["ground"], "rubber_tile")
             subprocess.run([sys.executable, ROOT / "tests/app/schema.py", ROOT / "docs/schema/sweep.json", folder / "1.json"], check=True)
             rows = [line.split(",") for line in (folder / "curve.csv").read_text().splitlines()]
             self.assertEqual((rows[0], len(rows)), (["value", "trials", "upright", "chance", "low", "high"], 162))
