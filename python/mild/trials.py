@@ -25,6 +25,7 @@ if typing.TYPE_CHECKING:
 GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense")
 TILT = 1.0  # [rad] a base that leans more has fallen
 LOW = 0.4  # a base that is less than this part of its height at the start above the ground and above its lowest sole has fallen
+STANDS = 0.25  # who walks at less than this part of the command stands
 SETTLE, LEAST = 2.0, 2.5  # [s] speed and cost count after the first, of walks longer than the second; as in mild eval
 
 
@@ -82,6 +83,17 @@ class Table:
                  "sinkage": row.mean("sinkage"), "falls": list(row.falls),
                  "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
         return {**self.about, "rows": rows}
+
+    def remarks(self) -> list[str]:
+        """What its rows on rigid ground say against the description, as lines."""
+        lines = []
+        for row in self.rows:
+            speed, wanted = row.mean("speed"), row.command[0]
+            if row.ground == "rigid" and wanted and 2 * row.upright < len(row.walks):
+                lines.append(f"rigid: it falls at {wanted:g} m/s; unless it is known to, the description is wrong: compare --check with its training")
+            elif row.ground == "rigid" and speed is not None and abs(speed) < STANDS * abs(wanted):
+                lines.append(f"rigid: it stands at {wanted:g} m/s; a dead zone of its command, or a wrong description: try --speed {2 * wanted:g}")
+        return lines
 
     def __str__(self) -> str:
         lines = [f"{'ground':<12}{'command':>8}{'upright':>10}{'speed':>8}{'cost':>7}{'torque':>8}{'sinkage':>9}  falls after"]
@@ -553,8 +565,8 @@ def main(argv=None):
                       sideways=arguments.sideways, turn=arguments.turn, trials=arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
                       noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
         print(table, file=out)
-        if table.about["remark"]:
-            print(table.about["remark"], file=out)
+        for line in filter(None, (table.about["remark"], *table.remarks())):
+            print(line, file=out)
         if arguments.json == "-":
             json.dump(table.as_dict(), sys.stdout, indent=2)
         elif arguments.json:

@@ -596,6 +596,16 @@ class Trials(unittest.TestCase):
         self.assertAlmostEqual(row.mean("sinkage"), wanted["penetration"], delta=0.05 * wanted["penetration"])
 
 
+class Remarks(unittest.TestCase):
+    def test_rigid(self):
+        """Falls and standing on rigid ground are said; a command of 0, and other grounds, are not."""
+        def row(ground, command, speed, falls):
+            return trials.Row(ground, (command, 0, 0), [trials.Walk(k, 10, "tilt" if k < falls else "time", speed, 0, None, 1, 0) for k in range(4)])
+        for one, line in ((row("rigid", 0.5, 0.4, 0), ""), (row("rigid", 0.5, 0.4, 2), ""), (row("rigid", 0.5, 0.4, 3), "falls at 0.5 m/s.*--check"),
+                          (row("rigid", 0.5, 0.1, 0), "stands at 0.5 m/s; a dead zone.*--speed 1$"), (row("rigid", 0, 0, 0), ""), (row("grass", 0.5, 0, 4), "")):
+            self.assertRegex(" ".join(trials.Table({}, [one]).remarks()), f"^{'rigid: it ' if line else ''}{line}{'' if line else '$'}")
+
+
 class Command(unittest.TestCase):
     def run_main(self, *arguments):
         out, error = io.StringIO(), io.StringIO()
