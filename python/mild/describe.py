@@ -256,7 +256,10 @@ def _term(name, key, text):
 
 def _matches(pattern, joints):
     """For each joint whether a pattern matches its whole name, or is @ and its number."""
-    return [re.fullmatch(pattern, joint) is not None or pattern == f"@{k}" for k, joint in enumerate(joints)]
+    try:
+        return [re.fullmatch(pattern, joint) is not None or pattern == f"@{k}" for k, joint in enumerate(joints)]
+    except re.error as error:
+        raise ValueError(f"joints: '{pattern}' is no regular expression: {error}") from None
 
 
 def by_joint(rows, joints, otherwise, section):

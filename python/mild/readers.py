@@ -117,6 +117,17 @@ class Part:
     def numbers(self, count=None):
         return [Part(value, self.file, f"{self.key}[{k}]").number() for k, value in enumerate(self.list(count))]
 
+    def names(self):
+        if any(not isinstance(value, str) for value in self.list()):
+            raise self.wrong("must be a list of names")
+        return [value.strip() for value in self.list()]
+
+    def integer(self):
+        value = self.number()
+        if not math.isfinite(value) or value != round(value):
+            raise self.wrong(f"must be a whole number, not {self.value!r}")
+        return int(value)
+
     def json(self):
         try:
             return Part(json.loads(self.value), self.file, self.key)
@@ -220,7 +231,7 @@ def _deploy_observation(part):
         elif name != "scale_first":
             _no_clip(term)
             terms.add(name, term.get("scale", [1.0]).numbers())
-            frames.append((term, term.get("history_length", 1).number()))
+            frames.append((term, term.get("history_length", 1).integer()))
             if name == "gait_phase":
                 clock = {"period": term["params"]["period"].number(), "standing": 0.1}
     return {"observation": terms.keys, "clock": clock, "history": {"frames": _one_length(frames), "stack": stack}}
@@ -229,8 +240,8 @@ def _deploy_observation(part):
 def _one_length(frames):
     for part, length in frames:
         if length != frames[0][1]:
-            raise part.wrong(f"has a history of {length:g} frames, and the first term one of {frames[0][1]:g}")
-    return max(1, int(frames[0][1])) if frames else 1
+            raise part.wrong(f"has a history of {length} frames, and the first term one of {frames[0][1]}")
+    return max(1, frames[0][1]) if frames else 1
 
 
 def _no_clip(part):
@@ -289,13 +300,13 @@ def _isaac(document):
         implicit |= str(motor.get("class_type", "").value).endswith("ImplicitActuator")
         for table, keys in (("kp", ("stiffness",)), ("kd", ("damping",)), ("effort", ("effort_limit_sim", "effort_limit")), ("armature", ("armature",))):
             tables[table].update(_of_motor(motor, keys, table))
-    found = {"policy": {"joints": action["joint_names"].list(), "order": "listed" if listed else "breadth", "step": f"{document['sim']['dt'].number():g}",
-                        "decimation": int(document["decimation"].number())},
+    found = {"policy": {"joints": action["joint_names"].names(), "order": "listed" if listed else "breadth", "step": f"{document['sim']['dt'].number():g}",
+                        "decimation": document["decimation"].integer()},
              "action": {"seen": "raw", "target": "default" if whole else "zero"},
              "actuator": {"kind": "servo" if implicit else "torque"},
              "default": {key: value.number() for key, value in robot["init_state"]["joint_pos"].items()},
-             "scale": _by_pattern(action.get("scale", 1.0), action["joint_names"].list()), **tables,
-             **_limits(action, action["joint_names"].list())}
+             "scale": _by_pattern(action.get("scale", 1.0), action["joint_names"].names()), **tables,
+             **_limits(action, action["joint_names"].names())}
     if implicit:
         found["policy"]["integrator"] = "implicitfast"
     group = next((document["observations"][name] for name in ("policy", "actor") if name in document["observations"]), None)
@@ -307,7 +318,7 @@ def _isaac(document):
 def _isaac_observation(group):
     if group.get("concatenate_terms", True).value is not True:
         raise group["concatenate_terms"].wrong("must be true")
-    terms, frames, seen, whole = Observation(ISAAC), [], [], group.get("history_length", 0).number()
+    terms, frames, seen, whole = Observation(ISAAC), [], [], group.get("history_length", 0).integer()
     for name, term in group.items():
         if not isinstance(term.value, dict) or "func" not in term:
             continue
@@ -317,7 +328,7 @@ def _isaac_observation(group):
         function = re.split(r"[:.]", str(term["func"].value))[-1]
         scale = term.get("scale", 1.0)
         terms.add(function, scale.numbers() if isinstance(scale.value, list) else [scale.number()])
-        frames.append((term, whole or term.get("history_length", 0).number()))
+        frames.append((term, whole or term.get("history_length", 0).integer()))
         if function.startswith("joint_"):
             joints = term.get("params", {}).get("asset_cfg", {}).get("joint_names", ".*").value
             seen.append((term, joints if isinstance(joints, list) else [joints]))
@@ -336,7 +347,7 @@ def _descriptors(document):
     if not isinstance(rows.value, list) or len(rows.value) != 1:
         raise rows.wrong("must be a list of one action")
     action = Part(rows.value[0], document.file, "actions[0]")
-    names, moved = robot["joint_names"].list(), action["joint_names"].list()
+    names, moved = robot["joint_names"].names(), action["joint_names"].names()
     scale, count = action.get("scale", 1.0), len(names)
     default = dict(zip(names, robot["default_joint_pos"].numbers(count)))
     rows, terms, frames, seen = document["observations"]["policy"], Observation(ISAAC), [], []
@@ -345,13 +356,13 @@ def _descriptors(document):
         form = term.get("overloads", {})
         factor = form.get("scale", 1.0)
         terms.add(str(term["full_path"].value).split(".")[-1], factor.numbers() if isinstance(factor.value, list) else [factor.number()])
-        frames.append((term, form.get("history_length", 0).number()))
+        frames.append((term, form.get("history_length", 0).integer()))
         if "joint_names" in term:
-            seen.append((term, term["joint_names"].list()))
+            seen.append((term, term["joint_names"].names()))
             if seen[-1][1] != seen[0][1]:
                 raise term.wrong("sees other joints than the first term of joints")
     found = {"policy": {"joints": moved, "observed": seen[0][1] if seen else moved, "step": f"{document['scene']['physics_dt'].number():g}",
-                        "decimation": int(document["scene"]["decimation"].number()), "integrator": "implicitfast"},
+                        "decimation": document["scene"]["decimation"].integer(), "integrator": "implicitfast"},
              "action": {"seen": "raw", "target": _target(action, [default.get(name, 0.0) for name in moved])}, "actuator": {"kind": "servo"},
              "observation": terms.keys, "history": {"frames": _one_length(frames), "stack": "term"}, "default": default,
              "scale": dict(zip(moved, scale.numbers(len(moved)) if isinstance(scale.value, list) else [scale.number()] * len(moved)))}
@@ -362,7 +373,7 @@ def _descriptors(document):
 
 def _of_motor(motor, keys, table):
     """{pattern: number} of one key of a group of actuators. Gains that are null are those of the simulator's own file, which is not here: nan."""
-    joints = motor["joint_names_expr"].list()
+    joints = motor["joint_names_expr"].names()
     part = next((motor.get(key) for key in keys if key in motor), None)
     if part is not None:
         return _by_pattern(part, joints)
@@ -386,13 +397,13 @@ def _with(found, more):
 # ---- metadata of ONNX files ----
 def _mjlab(about, width):
     """mjlab's step, decisions and actuators are those of its velocity tasks, the layout mjlab; how many frames it sees is found from the input."""
-    joints = [str(name) for name in about["joint_names"].list()]
+    joints = about["joint_names"].names()
     scale = about["action_scale"].numbers()
     if len(scale) not in (1, len(joints)):
         raise about["action_scale"].wrong(f"has {len(scale)} values, and there are {len(joints)} joints, so that it is not known which it moves")
     terms = Observation(MJLAB)
-    for name in about["observation_names"].list():
-        terms.add(name.strip())
+    for name in about["observation_names"].names():
+        terms.add(name)
     found = {"policy": {"layout": "mjlab", "joints": joints}, "observation": terms.keys, "history": {"frames": 0, "stack": "term"},
              "scale": dict(zip(joints, scale * len(joints) if len(scale) == 1 else scale))}
     for section, key in (("kp", "joint_stiffness"), ("kd", "joint_damping"), ("default", "default_joint_pos")):
@@ -404,7 +415,7 @@ def _mjlab(about, width):
 
 def _holosoma(about, width):
     """Its program sorts the observation by name. Files without experiment_config lack the pose and the observation."""
-    joints = about["dof_names"].json().list()
+    joints = about["dof_names"].json().names()
     found = {"policy": {"joints": joints, "step": 0.005, "decimation": 4, "integrator": "implicitfast"}, "actuator": {"kind": "servo"},
              "kp": dict(zip(joints, about["kp"].json().numbers(len(joints)))), "kd": dict(zip(joints, about["kd"].json().numbers(len(joints)))),
              "default": {".*": math.nan}}
@@ -420,12 +431,12 @@ def _holosoma(about, width):
         raise control["action_scales_by_effort_limit_over_p_gain"].wrong("must be false")
     gait = config["command"]["setup_terms"].get("locomotion_gait", {}).get("params", {})
     return _with(found, {
-        "policy": {"step": f"{1 / sim['fps'].number():g}", "decimation": int(sim["control_decimation"].number())},
+        "policy": {"step": f"{1 / sim['fps'].number():g}", "decimation": sim["control_decimation"].integer()},
         "default": {name: value.number() for name, value in robot["init_state"]["default_joint_angles"].items()},
         "scale": {".*": control["action_scale"].number() * action.get("scale", 1.0).number()}, "observation": terms.keys,
         "effort": dict(zip(joints, robot["dof_effort_limit_list"].numbers(len(joints)))),
         "armature": dict(zip(joints, robot["dof_armature_list"].numbers(len(joints)))),
         "action": {"clip": control.get("action_clip_value", math.inf).number()},
-        "history": {"frames": int(group.get("history_length", 1).number()), "stack": "term"},
+        "history": {"frames": group.get("history_length", 1).integer(), "stack": "term"},
         "clock": {"period": gait.get("gait_period", 1.0).number(), "offsets": [0, 0.5], "standing": 0.01, "standing_phase": 0.5}})
 

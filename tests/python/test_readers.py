@@ -48,7 +48,7 @@ observations:
     concatenate_terms: true
     history_length: 2
     base_ang_vel: {func: isaaclab.envs.mdp.observations:base_ang_vel, params: {}, modifiers: null, clip: !!python/tuple [-100, 100], scale: 0.25,
-                   noise: {func: !!python/name:os.system ""}}
+                   noise: {func: !!python/object/apply:os.system ["exit"]}}
     pose: {func: isaaclab.envs.mdp.observations:joint_pos_rel, params: {asset_cfg: {joint_names: [.*], joint_ids: !!python/object/apply:builtins.slice [null, null, null]}},
            clip: null, scale: null}
     actions: {func: isaaclab.envs.mdp.observations:last_action, params: {}, clip: null, scale: null, history_length: 7}
@@ -66,6 +66,15 @@ IO = {"observations": {"policy": [{**TERM, "full_path": "isaaclab.envs.mdp.obser
       "articulations": {"robot": {"joint_names": JOINTS, "default_joint_pos": [0.1, 0.2, 0.3, 0.4], "default_joint_stiffness": [1, 2, 3, 4],
                                   "default_joint_damping": [5, 6, 7, 8], "default_joint_armature": [0.01] * 4}},
       "scene": {"physics_dt": 0.005, "decimation": 4}}
+
+HOLOSOMA = {"simulator": {"config": {"sim": {"fps": 200, "control_decimation": 4}}},
+            "observation": {"groups": {"actor_obs": {"history_length": 1, "terms": {
+                "dof_pos": {"scale": 1.0}, "base_ang_vel": {"scale": 0.25}, "command_lin_vel": {"scale": 1.0}, "command_ang_vel": {"scale": 1.0},
+                "sin_phase": {"scale": 1.0}}}}},
+            "action": {"terms": {"joint_control": {"func": "a:b", "scale": 1.0}}},
+            "command": {"setup_terms": {"locomotion_gait": {"params": {"gait_period": 0.9}}}},
+            "robot": {"init_state": {"default_joint_angles": dict(zip(JOINTS, [0.1, 0.2, 0.3, 0.4]))}, "dof_effort_limit_list": [9] * 4,
+                      "dof_armature_list": [0.01] * 4, "control": {"action_scale": 0.25, "action_clip_value": 100}}}
 
 
 def onnxruntime(metadata, width):
@@ -102,6 +111,14 @@ def change(document, path, value):
     else:
         part[last] = value
     return document
+
+
+def paths(document, way=()):
+    """Ways to every part of a document."""
+    for key, part in document.items() if isinstance(document, dict) else enumerate(document):
+        yield (*way, key)
+        if isinstance(part, (dict, list)):
+            yield from paths(part, (*way, key))
 
 
 class Files(unittest.TestCase):
@@ -232,6 +249,25 @@ class Yaml(Files):
             self.assertIn(path.name, str(caught.exception))
             self.assertNotIn("\n", str(caught.exception))
 
+    def test_any(self):
+        """Any value in the place of any other is read, or refused in one line."""
+        env = readers._load(self.write(ENV, "env.yaml"))
+        config = {"dof_names": json.dumps(JOINTS), "kp": "[1, 2, 3, 4]", "kd": "[1, 2, 3, 4]", "experiment_config": json.dumps(HOLOSOMA)}
+        readings = [(read, document, ()) for read, document in ((readers._deploy, DEPLOY), (readers._isaac, env), (readers._descriptors, IO))]
+        readings += [(readers._mjlab, MJLAB, (21,)), (readers._holosoma, config, (21,)),
+                     (lambda part, width: readers._holosoma(readers.Part({**config, "experiment_config": json.dumps(part.value)}, "f"), width), HOLOSOMA, (21,))]
+        count = 0
+        for read, document, more in readings:
+            for path in paths(document):
+                for value in (..., None, True, -1.5, "x", "nan", [], {}, [1], {"a": {"b": None}}, ["("]):
+                    changed = change(document, path, value)
+                    try:
+                        Description(readers._texts(read(readers.Part(changed, "f"), *more)))
+                    except ValueError as error:
+                        self.assertNotIn("\n", str(error))
+                    count += 1
+        self.assertGreater(count, 2000)
+
     def test_model(self):
         """Joints by number need the model that has them all."""
         d = Description(self.write(change(change(DEPLOY, ["joint_ids_map"], [0, 1]), ["observations"], {"projected_gravity": {"params": {}}})
@@ -302,16 +338,8 @@ class Onnx(Files):
 
     def test_holosoma(self):
         """Terms by name, two clocks; without its experiment the pose is asked for."""
-        config = {"simulator": {"config": {"sim": {"fps": 200, "control_decimation": 4}}},
-                  "observation": {"groups": {"actor_obs": {"history_length": 1, "terms": {
-                      "dof_pos": {"scale": 1.0}, "base_ang_vel": {"scale": 0.25}, "command_lin_vel": {"scale": 1.0}, "command_ang_vel": {"scale": 1.0},
-                      "sin_phase": {"scale": 1.0}}}}},
-                  "action": {"terms": {"joint_control": {"func": "a:b", "scale": 1.0}}},
-                  "command": {"setup_terms": {"locomotion_gait": {"params": {"gait_period": 0.9}}}},
-                  "robot": {"init_state": {"default_joint_angles": dict(zip(JOINTS, [0.1, 0.2, 0.3, 0.4]))}, "dof_effort_limit_list": [9] * 4,
-                            "dof_armature_list": [0.01] * 4, "control": {"action_scale": 0.25, "action_clip_value": 100}}}
         metadata = {"dof_names": json.dumps(JOINTS), "kp": "[1, 2, 3, 4]", "kd": "[5, 6, 7, 8]"}
-        d = Description(self.onnx(metadata, experiment_config=json.dumps(config)))
+        d = Description(self.onnx(metadata, experiment_config=json.dumps(HOLOSOMA)))
         robot = self.robot(d)
         self.assertEqual((robot.kp.tolist(), robot.default.tolist(), robot.effort.tolist(), robot.scale.tolist()),
                          ([1, 2, 3, 4], [0.1, 0.2, 0.3, 0.4], [9] * 4, [0.25] * 4))
