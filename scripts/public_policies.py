@@ -28,7 +28,6 @@ REPOSITORIES = {  # folder of CLONES: place, commit, licence
     "RUN_DEPLOY": ("PMY9527/RUN_DEPLOY", "94027bfbf178c7b7a499b3aa2b32d40f53bc18ba", "none"),
     "G1-15DoF-Sim2Sim": ("lgkimjy/G1-15DoF-Sim2Sim", "2d6adf992dc5d2af219d5f50af6dea886533ba81", "MIT"),
     "holosoma": ("amazon-far/holosoma", "fc600e7db2de580509eedaa656ca6c601bd3af9b", "Apache-2.0"),
-    "g1-motion-control": ("lez666/g1-motion-control", "4f3e8c5bf61fecb5c0f5ce966ff81ccb99b892ad", "MIT"),
     "legged_rl_lab": ("zihanwang0422/legged_rl_lab", "a0b2c98c20ffd6e9b5a6488dbece3675e4685b85", "none"),
     "OpenHomie": ("InternRobotics/OpenHomie", "cefcd85fcf81f529e8be065795fb2a7273e69435", "CC-BY-NC-4.0"),
     "OpenWBT": ("GalaxyGeneralRobotics/OpenWBT", "2962100aad3afa921daf151d30f5c4c049640358", "Apache-2.0"),
@@ -47,7 +46,6 @@ HOLOSOMA = "holosoma/src/holosoma/holosoma/data/robots/{}"
 LOCO = "holosoma/src/holosoma_inference/holosoma_inference/models/loco/{}"
 LAB = "legged_rl_lab/deploy/g1_deploy/{}"
 DEPLOY = "unitree_g1_deploy/deploy/robots/g1/config/policy/{}"
-RUNS = "g1-motion-control/my work space/logs/hv-g1-manager/{}"
 POLICIES = {  # name: robot, model, policy, options. Described by its ini in examples/trial, and where there is none by what comes with it
     "unitree_g1": ("Unitree G1, 12 joints", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_g1_sole": ("Unitree G1, 12 joints, sole of its mesh", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
@@ -76,8 +74,6 @@ POLICIES = {  # name: robot, model, policy, options. Described by its ini in exa
                        "G1-15DoF-Sim2Sim/onnx/2026-04-10_00-36-11_rsl_rl/exported/policy.onnx"),
     "g1_15dof_may": ("Unitree G1, 15 joints", "G1-15DoF-Sim2Sim/model/G1/g1_15dof_fake_torso.xml",
                      "G1-15DoF-Sim2Sim/onnx/2026-05-12_10-42-26_rsl_rl_upright_torso/exported/policy.onnx"),
-    "holosoma_robust_22200": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"),
-                              RUNS.format("20260114_121547-g1_robust_8192envs_refined_20260114_201542-locomotion/model_22200.onnx")),
     "engineai_sa01": ("EngineAI SA01", "engineai_legged_gym/resources/robots/zq_humanoid/urdf/zq_sa01.xml",
                       "engineai_humanoid/EngineAI_Controller/user/EngineAI_Humanoid_Controller/Controllers/RL_Controller/policy/zqsa01/zqsa01_policy.onnx"),
     "holosoma_g1": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/fastsac_g1_29dof.onnx")),
