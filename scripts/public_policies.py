@@ -23,11 +23,31 @@ REPOSITORIES = {  # folder of CLONES: place, commit, licence
     "booster_gym": ("BoosterRobotics/booster_gym", "da396a06d6eed99e2de72d7749c48ee8748950f9", "Apache-2.0"),
     "humanoid-gym": ("roboterax/humanoid-gym", "ae46e201c85a2b17e7f2cea59a441dae7ea88a8f", "BSD-3-Clause"),
     "rl_sar": ("fan-ziqi/rl_sar", "e384912fb4b24cb09bfe190686b113b7348019c9", "Apache-2.0"),
+    "unitree_g1_deploy": ("22371347/unitree_g1_deploy", "38310fa3f4732ede22d338946dc0eedd4caf7f0a", "Apache-2.0"),
+    "unitree_rl_mjlab": ("unitreerobotics/unitree_rl_mjlab", "5b7e39658e33ec63b9283688ef23b38434c9d5c5", "Apache-2.0"),
+    "legged_rl_deploy": ("Renkunzhao/legged_rl_deploy", "0783dbc3f99b79a42f09988c659cd5e5113c0c4d", "none"),
+    "RUN_DEPLOY": ("PMY9527/RUN_DEPLOY", "94027bfbf178c7b7a499b3aa2b32d40f53bc18ba", "none"),
+    "G1-15DoF-Sim2Sim": ("lgkimjy/G1-15DoF-Sim2Sim", "2d6adf992dc5d2af219d5f50af6dea886533ba81", "MIT"),
+    "holosoma": ("amazon-far/holosoma", "fc600e7db2de580509eedaa656ca6c601bd3af9b", "Apache-2.0"),
+    "legged_rl_lab": ("zihanwang0422/legged_rl_lab", "a0b2c98c20ffd6e9b5a6488dbece3675e4685b85", "none"),
+    "OpenHomie": ("InternRobotics/OpenHomie", "cefcd85fcf81f529e8be065795fb2a7273e69435", "CC-BY-NC-4.0"),
+    "OpenWBT": ("GalaxyGeneralRobotics/OpenWBT", "2962100aad3afa921daf151d30f5c4c049640358", "Apache-2.0"),
+    "FALCON": ("LeCAR-Lab/FALCON", "25ad085bcb6052b6a192712bb5fd6c149f360787", "MIT"),
+    "grove-g1": ("Adyansh04/grove-g1", "97bfb9ba13569a593b5e3ecfc5ed1d4208b2b681", "Apache-2.0"),
+    "roboto_origin": ("Roboparty/roboto_origin", "e7a7b662c3c3b3a0153402266859bdbb69291b17", "GPL-3.0"),
+    "unitree_h12_sim2sim": ("correlllab/unitree_h12_sim2sim", "a915b1ed8040caa931d14ba806f346f439db98a4", "none"),
+    "engineai_humanoid": ("engineai-robotics/engineai_humanoid", "5c0cb92a99819744abe0511291533fc37e556903", "none"),
+    "engineai_legged_gym": ("engineai-robotics/engineai_legged_gym", "1a659aa0aa77445766ecea6d95708a5812e9f290", "none"),
     "pnd_rl_mjlab": ("pndbotics/pnd_rl_mjlab", "6c724bf11823c9b9d50f78d86662b721dc1a8bfe", "Apache-2.0"),
 }
 GYM, SIM2SIM = "unitree_rl_gym/deploy/pre_train/{}/motion.pt", "mujoco_playground/mujoco_playground/experimental/sim2sim/onnx/{}_policy.onnx"
 OWN = str(ROOT / "examples/trial/policies.py")
-POLICIES = {  # description in examples/trial: robot, model, policy
+G1 = "unitree_mujoco/unitree_robots/g1/scene_29dof.xml"
+HOLOSOMA = "holosoma/src/holosoma/holosoma/data/robots/{}"
+LOCO = "holosoma/src/holosoma_inference/holosoma_inference/models/loco/{}"
+LAB = "legged_rl_lab/deploy/g1_deploy/{}"
+DEPLOY = "unitree_g1_deploy/deploy/robots/g1/config/policy/{}"
+POLICIES = {  # name: robot, model, policy, options. Described by its ini in examples/trial, and where there is none by what comes with it
     "unitree_g1": ("Unitree G1, 12 joints", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_g1_sole": ("Unitree G1, 12 joints, sole of its mesh", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_h1": ("Unitree H1", "unitree_rl_gym/resources/robots/h1/scene.xml", GYM.format("h1")),
@@ -46,6 +66,32 @@ POLICIES = {  # description in examples/trial: robot, model, policy
     "himloco_go2": ("Unitree Go2, HIMLoco", "unitree_mujoco/unitree_robots/go2/scene.xml", "rl_sar/policy/go2/himloco/himloco.pt"),
     "robot_lab_go2": ("Unitree Go2, robot_lab", "unitree_mujoco/unitree_robots/go2/scene.xml", "rl_sar/policy/go2/robot_lab/policy.pt"),
     "robot_lab_b2": ("Unitree B2, robot_lab", "unitree_mujoco/unitree_robots/b2/scene.xml", "rl_sar/policy/b2/robot_lab/policy.pt"),
+    "rl_mjlab_g1": ("Unitree G1, 29 joints", G1, DEPLOY.format("velocity/v0/exported/policy.onnx")),
+    "amp_mjlab_g1": ("Unitree G1, 29 joints", G1, DEPLOY.format("AMP/exported/policy_28k.onnx")),
+    "unitree_rl_mjlab_g1": ("Unitree G1, 29 joints", G1, "unitree_rl_mjlab/deploy/robots/g1/config/policy/velocity/v0/exported/policy.onnx"),
+    "legged_rl_deploy_g1": ("Unitree G1, 29 joints", G1, "legged_rl_deploy/policies/g1/velocity/mjlab/policy.onnx"),
+    "run_amp_g1": ("Unitree G1, 29 joints, at 0.8 m/s", G1, "RUN_DEPLOY/robots/g1_29dof/config/policy/velocity/amp/exported/policy1.onnx", "--speed 0.8"),
+    "g1_15dof_april": ("Unitree G1, 15 joints", "G1-15DoF-Sim2Sim/model/G1/g1_15dof_fake_torso.xml",
+                       "G1-15DoF-Sim2Sim/onnx/2026-04-10_00-36-11_rsl_rl/exported/policy.onnx"),
+    "g1_15dof_may": ("Unitree G1, 15 joints", "G1-15DoF-Sim2Sim/model/G1/g1_15dof_fake_torso.xml",
+                     "G1-15DoF-Sim2Sim/onnx/2026-05-12_10-42-26_rsl_rl_upright_torso/exported/policy.onnx"),
+    "engineai_sa01": ("EngineAI SA01", "engineai_legged_gym/resources/robots/zq_humanoid/urdf/zq_sa01.xml",
+                      "engineai_humanoid/EngineAI_Controller/user/EngineAI_Humanoid_Controller/Controllers/RL_Controller/policy/zqsa01/zqsa01_policy.onnx"),
+    "holosoma_g1": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/fastsac_g1_29dof.onnx")),
+    "holosoma_g1_ppo": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/ppo_g1_29dof.onnx")),
+    "holosoma_t1": ("Booster T1, 29 joints", HOLOSOMA.format("t1/t1_29dof.xml"), LOCO.format("t1_29dof/fastsac_t1_29dof.onnx")),
+    "holosoma_t1_ppo": ("Booster T1, 29 joints", HOLOSOMA.format("t1/t1_29dof.xml"), LOCO.format("t1_29dof/ppo_t1_29dof.onnx")),
+    "legged_rl_lab_g1": ("Unitree G1, 29 joints", LAB.format("assets/scene_29dof.xml"), LAB.format("exported_policy/g1_flat_1.onnx")),
+    "legged_rl_lab_g1_amp": ("Unitree G1, 29 joints", LAB.format("assets/scene_29dof.xml"), LAB.format("exported_policy/g1_walk.onnx")),
+    "homie_g1": ("Unitree G1, 12 joints", "OpenHomie/HomieRL/legged_gym/resources/robots/g1_description/g1.xml", "OpenHomie/HomieDeploy/deploy.onnx"),
+    "grove_g1": ("Unitree G1, 14 joints", G1, "grove-g1/workspace/src/g1_controllers/policy/unitree_g1_velocity_e2e.onnx"),
+    "openwbt_g1": ("Unitree G1, 12 joints", G1, "OpenWBT/ckpts/loco.onnx"),
+    "falcon_g1": ("Unitree G1, 15 joints", G1, "FALCON/sim2real/models/dec_loco/g1_29dof.onnx"),
+    "atom01": ("RoboParty Atom01", "roboto_origin/modules/atom01_train/robolab/data/robots/roboparty/atom01/mjcf/atom01.xml",
+               "roboto_origin/modules/atom01_deploy/src/inference/models/policy.onnx"),
+    "h1_2_sim2sim": ("Unitree H1-2, 27 joints", "unitree_h12_sim2sim/mujoco/h1_2/h1_2_handless.xml",
+                     "unitree_h12_sim2sim/wbc_agile_utils/logs/rsl_rl/unitree_h12_walk/2026-01-21_11-22-09/exported/policy.onnx",
+                     "--describe {clones}/unitree_h12_sim2sim/mujoco/model_and_yaml/walk/unitree_h12_walk_v0_IO_descriptors.yaml"),
     "mild_g1": ("Unitree G1, 12 joints: ours", "unitree_rl_gym/resources/robots/g1_description/scene.xml", OWN + ":G1"),
     "mild_go1": ("Unitree Go1: ours", "mujoco_playground/" + PLAYGROUND.format("go1"), OWN + ":Go1"),
 }
@@ -60,10 +106,12 @@ def run(clones, out, name, options, sweep=None):
     """The JSON of one policy."""
     target = out / (f"{name}-{sweep}.json" if sweep else f"{name}.json")
     if sweep or not target.is_file():
-        _, model, policy = POLICIES[name]
+        _, model, policy, *own = POLICIES[name]
         policy = policy if policy.startswith("/") else str(clones / policy)
-        subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, "--describe", str(ROOT / f"examples/trial/{name}.ini"),
-                        "--json", str(target), *(["--sweep", sweep] if sweep else []), *options], check=True)
+        describe = ROOT / f"examples/trial/{name}.ini"
+        subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, *(["--describe", str(describe)] if describe.is_file() else []),
+                        "--json", str(target), *(["--sweep", sweep] if sweep else []), *options,
+                        *(own[0].format(clones=clones).split() if own else [])], check=True)
     return json.loads(target.read_text())
 
 

@@ -100,6 +100,8 @@ class Robot:
     default: np.ndarray
     effort: np.ndarray
     scale: np.ndarray  # of joints
+    lower: np.ndarray  # [rad] limits of their targets
+    upper: np.ndarray
     drive: np.ndarray  # actuator of each, -1: none
     gear: np.ndarray  # [N m] of an actuator's ctrl of 1
     base: int  # body
@@ -119,6 +121,24 @@ def joint_names(model):
 
     kinds, base = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)), floating(model)[0]
     return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in kinds and model.jnt_bodyid[j] != base]
+
+
+def breadth(model):
+    """Numbers of the joints of joint_names by depth in the tree of joints, those of one parent in the order of the model. Joints of one body
+    follow each other, as in a URDF, where each has a link."""
+    names, last, children = joint_names(model), {0: -1}, {}  # last: of each body, its last joint
+    numbers = {model.joint(name).id: k for k, name in enumerate(names)}
+    for body in range(1, model.nbody):
+        last[body] = last[int(model.body_parentid[body])]
+        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            if joint in numbers:
+                children.setdefault(last[body], []).append(numbers[joint])
+                last[body] = numbers[joint]
+    level, order = [-1], []
+    while level:
+        level = [child for one in level for child in children.get(one, ())]
+        order += level
+    return order
 
 
 def _world(model, description, ground, painted):
@@ -145,12 +165,18 @@ def stand(model, description, ground, attributes, painted=False):
     spec, remark = _world(model, d, ground, painted)
     bare = spec.copy().compile()
     names = joint_names(bare)
+    if d.policy["model_joints"] not in (0, len(names)):
+        raise ValueError(f"model: it has {len(names)} joints, and {d.name} {d.policy['model_joints']}, by number; give the model that its "
+                         "maker runs, or name policy.joints, policy.observed, kp, kd, default and scale in an ini")
     order, seen = choose(d.policy["joints"], names, "joints"), choose(d.policy["observed"] or d.policy["joints"], names, "observed")
+    if d.policy["order"] == "breadth":
+        order, seen = ([j for j in breadth(bare) if j in chosen] for chosen in (order, seen))
+    count = len(order)
     order += [j for j in range(len(names)) if j not in order]
-    count = len(choose(d.policy["joints"], names, "joints"))
     tables = {name: by_joint(getattr(d, name), names, otherwise, name)
-              for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0))}
-    scale = by_joint(d.scale, [names[j] for j in order[:count]], 1.0, "scale")
+              for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0),
+                                ("lower", -np.inf), ("upper", np.inf))}
+    scale = by_joint(d.scale, names, 1.0, "scale")[order[:count]]
     if ground == "rigid" and not any(bare.geom_contype[geom] or bare.geom_conaffinity[geom] or bare.npair for geom in solids(bare)):
         raise ValueError("model: no shape of the robot collides, so that it would fall through the rigid floor")
     start = _start(bare, d, names, tables["default"])
@@ -176,7 +202,8 @@ def stand(model, description, ground, attributes, painted=False):
     base, place, zero = floating(compiled)
     return Robot(compiled, [names[j] for j in order[:count]], [names[j] for j in order[count:]], qpos[order], qvel[order],
                  (qpos[seen], qvel[seen]), tables["default"][seen], tables["kp"][order], tables["kd"][order], tables["default"][order],
-                 tables["effort"][order], scale, drive, gear, base, place, zero, _frame(compiled, d, base), feet,
+                 tables["effort"][order], scale,
+                 tables["lower"][order[:count]], tables["upper"][order[:count]], drive, gear, base, place, zero, _frame(compiled, d, base), feet,
                  [compiled.geom(name).id for name in feet.soles], start,
                  float(compiled.body_subtreemass[base]), remark)
 

@@ -10,8 +10,10 @@ import re
 
 import numpy as np
 
+from . import readers
+
 FOLDER = pathlib.Path(__file__).parent / "layouts"
-TABLES = ("kp", "kd", "default", "effort", "scale", "armature")  # sections of numbers by joint, keys are regular expressions
+TABLES = ("kp", "kd", "default", "effort", "scale", "armature", "lower", "upper")  # sections of numbers by joint, keys are regular expressions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,18 +50,20 @@ KEYS = {
         "layout": Key(str, None, "a layout of the package, or a file beside this one, that this file completes"),
         "joints": Key(words, None, "joints of the action, in its order: regular expressions; without: all hinges and slides"),
         "observed": Key(words, None, "joints of the observation; without: those of the action"),
+        "order": Key(choice("listed", "breadth"), "listed", "listed: joints as they are named; breadth: by depth in the tree, as in Isaac Lab"),
+        "model_joints": Key(int, 0, "joints that the model must have, where they are named by number, @0 its first; 0: any"),
         "step": Key(float, 0.0, "[s] of physics; 0: that of the model"),
         "decimation": Key(int, 10, "steps of physics from decision to decision"),
         "delay": Key(float, 0.0, "[s] from an observation to its action, in whole steps of physics"),
         "integrator": Key(choice("", "Euler", "implicitfast", "implicit"), "", "without: that of the model"),
         "clip": Key(float, math.inf, "largest number of the observation"),
-        "input": Key(str, "", "ONNX: the input of the observation; without: the first"),
+        "input": Key(words, None, "ONNX: the inputs of the observation, one after the other; without: the first"),
         "output": Key(str, "", "ONNX: the output of the action; without: the first"),
         "state": Key(words, None, "ONNX: recurrent state, INPUT>OUTPUT for each; without: the other inputs and outputs in order"),
         "frame": Key(str, "", "body or site in whose axes the base's velocities and gravity are; without: the floating base"),
     },
     "history": {
-        "frames": Key(int, 1, "observations that the policy sees at once"),
+        "frames": Key(int, 1, "observations that the policy sees at once; 0: as many as the input of its ONNX holds"),
         "newest": Key(choice("last", "first"), "last", "place of the newest"),
         "stack": Key(choice("frame", "term"), "frame", "frame: whole observations in a row; term: the history of each term"),
         "start": Key(choice("repeat", "zero"), "repeat", "what is before the first observation"),
@@ -116,7 +120,11 @@ TERMS = {
     "linear_velocity": (lambda seen, moved, clocks: 3, lambda s: s.linear_velocity),
     "gravity": (lambda seen, moved, clocks: 3, lambda s: s.gravity),
     "euler": (lambda seen, moved, clocks: 3, lambda s: s.euler()),
+    "tangent_normal": (lambda seen, moved, clocks: 6, lambda s: s.tangent_normal()),
+    "quaternion": (lambda seen, moved, clocks: 4, lambda s: s.quaternion()),
     "command": (lambda seen, moved, clocks: 3, lambda s: s.command),
+    "command_linear": (lambda seen, moved, clocks: 2, lambda s: s.command[:2]),
+    "command_turn": (lambda seen, moved, clocks: 1, lambda s: s.command[2:]),
     "joint_position": (lambda seen, moved, clocks: seen, lambda s: s.joint_position - s.default),
     "joint_angle": (lambda seen, moved, clocks: seen, lambda s: s.joint_position),
     "joint_velocity": (lambda seen, moved, clocks: seen, lambda s: s.joint_velocity),
@@ -144,7 +152,8 @@ class Description:
     Term, .kp and the other tables lists of (pattern, number)."""
 
     def __init__(self, source: "str | pathlib.Path | dict | None" = None, changes=()):
-        """source: a file, the name of a layout, a dict of sections, or None; changes: {"section.key": text}, over the file."""
+        """source: a file (an ini, or one that mild.readers reads), the name of a layout, a dict of sections, or None; changes:
+        {"section.key": text}, over the file."""
         parser = _parser()
         self.name = source if isinstance(source, (str, pathlib.Path)) else "a dict"
         _read(parser, source)
@@ -163,8 +172,11 @@ class Description:
         self.terms = [_term(self.name, *line) for line in (parser.items("observation") if parser.has_section("observation") else [])]
         if not self.terms:
             raise ValueError(f"{self.name}: [observation] has no term; there are {', '.join([*TERMS, 'constant', 'sensor:NAME'])}")
-        if self.policy["decimation"] < 1 or self.history["frames"] < 1:
-            raise ValueError(f"{self.name}: policy.decimation and history.frames must be 1 or more")
+        if self.policy["decimation"] < 1 or self.history["frames"] < 0:
+            raise ValueError(f"{self.name}: policy.decimation must be 1 or more, history.frames 0 or more")
+        if not self.clock["period"] > 0:
+            raise ValueError(f"{self.name}: the observation has a clock whose period it does not say; give clock.period [s], such as "
+                             "--set clock.period=0.8, or the deploy.yaml that has it")
 
 
 def _parser():
@@ -191,7 +203,7 @@ def _read(parser, source):
             raise ValueError(f"describe: there is no file '{source}', and no such layout; there are {', '.join(layouts())}")
         own, folder = _parser(), path.parent
         try:
-            own.read_string(path.read_text(), str(source))
+            own.read_dict(readers.sections(path)) if path.suffix in readers.SUFFIXES else own.read_string(path.read_text(), str(source))
         except configparser.Error as error:
             raise ValueError(f"describe: {' '.join(str(error).split())}") from None
     base = own.get("policy", "layout", fallback=None)
@@ -230,7 +242,9 @@ def _table(name, parser, section):
 def _term(name, key, text):
     kind = key.split(".")[0]  # command.2: a second time
     if kind not in TERMS and kind != "constant" and not kind.startswith("sensor:"):
-        raise ValueError(f"{name}: [observation] has no term '{kind}'; there are {', '.join([*TERMS, 'constant', 'sensor:NAME'])}")
+        raise ValueError(f"{name}: [observation] has no term '{kind}'; there are {', '.join([*TERMS, 'constant', 'sensor:NAME'])}" +
+                         f"; an ini with `[policy] layout = {name}` and an [observation] of its own replaces it"
+                         * (pathlib.Path(str(name)).suffix in readers.SUFFIXES))
     try:
         values = numbers(text)
     except ValueError as error:
@@ -240,11 +254,19 @@ def _term(name, key, text):
     return Term(kind, np.array(values), len(values) if kind == "constant" else 0)
 
 
+def _matches(pattern, joints):
+    """For each joint whether a pattern matches its whole name, or is @ and its number."""
+    try:
+        return [re.fullmatch(pattern, joint) is not None or pattern == f"@{k}" for k, joint in enumerate(joints)]
+    except re.error as error:
+        raise ValueError(f"joints: '{pattern}' is no regular expression: {error}") from None
+
+
 def by_joint(rows, joints, otherwise, section):
     """A number for each joint: that of the last pattern that matches its whole name."""
     values = np.full(len(joints), np.nan if otherwise is None else otherwise)
     for pattern, value in rows:
-        hit = [bool(pattern.fullmatch(joint)) for joint in joints]
+        hit = _matches(pattern.pattern, joints)
         if not any(hit):
             raise ValueError(f"[{section}] {pattern.pattern}: no joint has such a name; there are {', '.join(joints)}")
         values[hit] = value
@@ -259,7 +281,7 @@ def choose(patterns, joints, key):
         return list(range(len(joints)))
     order = []
     for pattern in patterns:
-        found = [i for i, joint in enumerate(joints) if re.fullmatch(pattern, joint) and i not in order]
+        found = [i for i, hit in enumerate(_matches(pattern, joints)) if hit and i not in order]
         if not found:
             raise ValueError(f"policy.{key}: no joint is left for '{pattern}'; there are {', '.join(joints)}")
         order += found
@@ -269,9 +291,10 @@ def choose(patterns, joints, key):
 class Observer:
     """Makes what a policy sees, decision by decision, from a State."""
 
-    def __init__(self, description, seen, moved):
-        """seen, moved: how many joints it observes and moves."""
+    def __init__(self, description, seen, moved, size=None):
+        """seen, moved: how many joints it observes and moves; size: how many numbers the policy takes, where history.frames is 0."""
         d = self.description = description
+        self.size, self.length = size, d.history["frames"]
         self.counts = [term.count or (TERMS[term.name][0](seen, moved, len(d.clock["offsets"])) if term.name in TERMS else 0)
                        for term in d.terms]
         for term, count in zip(d.terms, self.counts):
@@ -281,6 +304,15 @@ class Observer:
 
     def reset(self):
         self.frames = []
+
+    def fit(self, count):
+        """How many frames of count numbers the policy takes."""
+        if not isinstance(self.size, int):
+            raise ValueError("history.frames: 0 needs an ONNX file whose input says its width; give the number of frames")
+        if self.size % count:
+            raise ValueError(f"policy: it sees {self.size} numbers, and one frame of the description has {count}, which is no part of it; "
+                             "--check lists them")
+        return self.size // count
 
     def frame(self, state):
         """A list of arrays, one for each term."""
@@ -299,7 +331,7 @@ class Observer:
         history, newest = self.description.history, self.frame(state)
         if not self.frames:
             before = newest if history["start"] == "repeat" else [np.zeros_like(part) for part in newest]
-            self.frames = [before] * history["frames"]
+            self.frames = [before] * (self.length or self.fit(sum(map(len, newest))))
         self.frames = [*self.frames[1:], newest]
         frames = self.frames if history["newest"] == "last" else self.frames[::-1]
         parts = [part for frame in frames for part in frame] if history["stack"] == "frame" else \
@@ -338,6 +370,19 @@ class State:
         """Roll, pitch, yaw [rad] of the frame."""
         r = self.rotation
         return np.array([math.atan2(r[2, 1], r[2, 2]), math.asin(max(-1.0, min(1.0, -r[2, 0]))), math.atan2(r[1, 0], r[0, 0])])
+
+    def tangent_normal(self):
+        """x and z axes of the frame, seen from a frame of the same heading."""
+        c, s = (function(self.euler()[2]) for function in (math.cos, math.sin))
+        return (np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ self.rotation[:, [0, 2]]).T.ravel()
+
+    def quaternion(self):
+        """w, x, y, z of the frame."""
+        import mujoco
+
+        found = np.zeros(4)
+        mujoco.mju_mat2Quat(found, self.rotation.ravel())
+        return found
 
     def clock(self, function):
         clock = self.description.clock

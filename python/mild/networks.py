@@ -59,24 +59,37 @@ class Callable:
         return np.asarray(self.function(observation), float).ravel()
 
 
+def session(path):
+    """onnxruntime's session of a file, on one thread. Raises ValueError for what is no ONNX."""
+    try:
+        import onnxruntime
+    except ImportError:
+        raise RuntimeError("policy: ONNX needs onnxruntime; `pip install mildground[trial]`") from None
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime's own kinds have no common one
+        raise ValueError(f"policy: onnxruntime cannot read {path}: {' '.join(str(error).split())}; is it a whole ONNX file, and its .data beside it? "
+                         "Git LFS leaves a text of three lines where `git lfs pull` has not run") from None
+
+
 class Onnx:
     """A graph with one row; other inputs are recurrent state, which comes back as other outputs."""
 
     def __init__(self, path, keys):
-        try:
-            import onnxruntime
-        except ImportError:
-            raise RuntimeError("policy: ONNX needs onnxruntime; `pip install mildground[trial]`") from None
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        self.session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self.session = session(path)
         inputs, outputs = {i.name: i for i in self.session.get_inputs()}, [o.name for o in self.session.get_outputs()]
-        self.input, self.output = keys["input"] or next(iter(inputs)), keys["output"] or outputs[0]
-        for name, names, key in ((self.input, inputs, "input"), (self.output, outputs, "output")):
+        self.seen, self.output = keys["input"] or [next(iter(inputs))], keys["output"] or outputs[0]
+        for name, names, key in [*((name, inputs, "input") for name in self.seen), (self.output, outputs, "output")]:
             if name not in names:
                 raise ValueError(f"policy.{key}: {path.name} has no '{name}'; there are {', '.join(names)}")
-        self.size = inputs[self.input].shape[-1]
-        rest = [name for name in inputs if name != self.input]
+        widths = [inputs[name].shape[-1] if inputs[name].shape else 1 for name in self.seen]
+        if len(widths) > 1 and not all(isinstance(width, int) for width in widths):
+            raise ValueError(f"policy.input: {path.name} does not say how wide {', '.join(self.seen)} are")
+        self.size = sum(widths) if len(widths) > 1 else widths[0]
+        self.cuts = np.cumsum(widths[:-1]) if len(widths) > 1 else []
+        rest = [name for name in inputs if name not in self.seen]
         pairs = [tuple(pair.split(">")) for pair in keys["state"]] if keys["state"] is not None else \
             list(zip(rest, [name for name in outputs if name != self.output]))
         if sorted(pair[0] for pair in pairs) != sorted(rest) or any(len(pair) != 2 or pair[1] not in outputs for pair in pairs):
@@ -93,9 +106,8 @@ class Onnx:
     def act(self, observation):
         if isinstance(self.size, int) and self.size != len(observation):
             raise ValueError(f"policy: it sees {self.size} numbers, and the description makes {len(observation)}")
-        rank = len(self.inputs[self.input].shape)
-        row = observation.reshape((1,) * (rank - 1) + (-1,))
-        action, *state = self.session.run(self.names, {self.input: row, **self.state})
+        rows = {name: part.reshape((1,) * (len(self.inputs[name].shape) - 1) + (-1,)) for name, part in zip(self.seen, np.split(observation, self.cuts))}
+        action, *state = self.session.run(self.names, {**rows, **self.state})
         self.state = {pair[0]: value for pair, value in zip(self.pairs, state)}
         return np.asarray(action, float).ravel()
 

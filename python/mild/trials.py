@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from . import _processor, networks
+from . import _processor, networks, readers
 from ._stand import area, lowest, stand
 from .describe import KEYS, TABLES, TERMS, Description, Observer, State, layouts
 
@@ -25,6 +25,7 @@ if typing.TYPE_CHECKING:
 GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense")
 TILT = 1.0  # [rad] a base that leans more has fallen
 LOW = 0.4  # a base that is less than this part of its height at the start above the ground and above its lowest sole has fallen
+STANDS = 0.25  # who walks at less than this part of the command stands
 SETTLE, LEAST = 2.0, 2.5  # [s] speed and cost count after the first, of walks longer than the second; as in mild eval
 
 
@@ -83,6 +84,17 @@ class Table:
                  "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
         return {**self.about, "rows": rows}
 
+    def remarks(self) -> list[str]:
+        """What its rows on rigid ground say against the description, as lines."""
+        lines = []
+        for row in self.rows:
+            speed, wanted = row.mean("speed"), row.command[0]
+            if row.ground == "rigid" and wanted and 2 * row.upright < len(row.walks):
+                lines.append(f"rigid: it falls at {wanted:g} m/s; unless it is known to, the description is wrong: compare --check with its training")
+            elif row.ground == "rigid" and speed is not None and abs(speed) < STANDS * abs(wanted):
+                lines.append(f"rigid: it stands at {wanted:g} m/s; a dead zone of its command, or a wrong description: try --speed {2 * wanted:g}")
+        return lines
+
     def __str__(self) -> str:
         lines = [f"{'ground':<12}{'command':>8}{'upright':>10}{'speed':>8}{'cost':>7}{'torque':>8}{'sinkage':>9}  falls after"]
         for row in self.rows:
@@ -100,7 +112,7 @@ def _text(value, digits):
 
 
 def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike | Callable[[np.ndarray], Sequence[float]]",
-          describe: "str | os.PathLike | Mapping | Description", *, ground: "str | Sequence[str]" = GROUNDS, speeds: Sequence[float] = (0.5,),
+          describe: "str | os.PathLike | Mapping | Description | None" = None, *, ground: "str | Sequence[str]" = GROUNDS, speeds: Sequence[float] = (0.5,),
           sideways: float = 0.0, turn: float = 0.0, trials: int = 10, seconds: float = 10.0, seed: int = 1, noise: float = 1.0,
           changes: Mapping[str, object] = types.MappingProxyType({}), attributes: Mapping[str, object] = types.MappingProxyType({}),
           video: "str | os.PathLike | None" = None, jobs: int = 1, report: "Callable[[Row], None] | None" = None,
@@ -109,11 +121,13 @@ def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike
 
     model: an MJCF file, XML text, or a mujoco.MjSpec. policy: a file .onnx or .pt (TorchScript), FILE.py:NAME, or a callable that
     makes an action (n,) of an observation (m,); its reset(), if there is one, begins a walk. describe: what it sees and does, a
-    file, a layout (mild.layouts()), a dict of sections, or a Description. ground: presets of mild.presets(), a list or a text with commas, and "rigid", which is
+    file (an ini, or a config of its trainer, mild.readers), a layout (mild.layouts()), a dict of sections, or a Description; None: what comes
+    with the policy. ground: presets of mild.presets(), a list or a text with commas, and "rigid", which is
     MuJoCo's own floor. speeds: forward commands [m/s]. trials: of each row, which differ by seed, heading, place, joints and
     noise; noise: times that of the description. changes: {"section.key": text} over the description. attributes: of mild.attach,
     such as ground__mu. video: a file, the first trial of each row. jobs: processes; more than one need policy, model and describe
     as files. report: called with each Row. Raises ValueError with one line for what is wrong, RuntimeError for what is missing."""
+    describe = readers.find(policy) if describe is None else describe
     d = describe if isinstance(describe, Description) else Description(describe, changes)
     if grounds is not None:
         warnings.warn("trial: grounds is named ground now", DeprecationWarning, stacklevel=2)
@@ -188,7 +202,7 @@ class Walker:
         self.data = mujoco.MjData(self.robot.model)
         r = self.robot
         self.state = State(description, r.model, self.data, r.frame, r.seen)
-        self.observer = Observer(description, len(r.seen[0]), len(r.joints))
+        self.observer = Observer(description, len(r.seen[0]), len(r.joints), getattr(network, "size", None))
         self.delay = round(description.policy["delay"] / r.model.opt.timestep)
         given = options["attributes"]  # soles that the plugin is given
         self.outlines = [np.array(text.split(), float).reshape(-1, 2) for text in given["outline"].split(";")] if "outline" in given else []
@@ -266,7 +280,7 @@ class Walker:
         s.action = clipped if action["seen"] == "clipped" else raw
         target, count = self.target.copy(), len(r.joints)
         zero = {"default": r.default[:count], "zero": 0.0, "last": target[:count]}[action["target"]]
-        target[:count] = zero + r.scale * clipped
+        target[:count] = np.clip(zero + r.scale * clipped, r.lower, r.upper)
         return target
 
     def drive(self, target):
@@ -454,7 +468,7 @@ def _list(read):
 
 
 EXAMPLES = """examples:
-  mild trial robot.xml policy.onnx --describe mine.ini --check
+  mild trial robot.xml policy.onnx --check
   mild trial robot.xml policy.pt --describe unitree_rl_gym --set policy.decimation=4 --ground rigid,grass
   mild trial robot.xml mine.py:Policy --describe mine.ini --speed 0.3,0.6 --attach ground.mu=0.5 --video walk.mp4
   mild trial robot.xml policy.onnx --describe mine.ini --sweep stiffness --json s50.json --plot s50.png"""
@@ -465,7 +479,8 @@ def parser():
                                 "ground and speed.", formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EXAMPLES)
     p.add_argument("model", nargs="?", help="MJCF of the robot")
     p.add_argument("policy", nargs="?", help="policy: .onnx, .pt (TorchScript), or FILE.py:NAME")
-    p.add_argument("--describe", metavar="FILE|LAYOUT", help=f"what it sees and does; layouts: {', '.join(layouts())}")
+    p.add_argument("--describe", metavar="FILE|LAYOUT", help="what it sees and does: an ini, a config of its trainer (deploy.yaml, env.yaml, ONNX "
+                   f"metadata), or a layout: {', '.join(layouts())}; without: what comes with the policy")
     p.add_argument("--ground", type=_list(str), default=list(GROUNDS), metavar="NAME[,NAME]", help="rigid (MuJoCo's own floor) and presets (default: nine)")
     p.add_argument("--speed", type=_list(float), default=[0.5], metavar="V[,V]", help="[m/s] forward (default 0.5)")
     p.add_argument("--sideways", type=float, default=0.0, metavar="V", help="[m/s] to the left")
@@ -526,7 +541,7 @@ def _check(arguments, description):
     for term, part in zip(description.terms, frame):
         print(f"{at:>4} {term.name:<18}{' '.join(f'{value:.3f}' for value in part)}")
         at += len(part)
-    print(f"{at} numbers, {at * description.history['frames']} with the history")
+    print(f"{at} numbers, {at * (walker.observer.length or walker.observer.fit(at))} with the history")
     if r.remark:
         print(r.remark)
     if arguments.policy:
@@ -540,8 +555,9 @@ def main(argv=None):
         print(_keys())
         return 0
     try:
-        if not arguments.model or not arguments.describe or not (arguments.policy or arguments.check):
-            raise ValueError("needs MODEL, POLICY and --describe; --help has an example of each")
+        if not arguments.model or not (arguments.policy or arguments.check and arguments.describe):
+            raise ValueError("needs MODEL and POLICY; --help has an example of each")
+        arguments.describe = arguments.describe or readers.find(arguments.policy)
         changes = _pairs(arguments.set, "set")
         if arguments.check:
             _check(arguments, Description(arguments.describe, changes))
@@ -560,8 +576,8 @@ def main(argv=None):
                       sideways=arguments.sideways, turn=arguments.turn, trials=10 if arguments.trials is None else arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
                       noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
         print(table, file=out)
-        if table.about["remark"]:
-            print(table.about["remark"], file=out)
+        for line in filter(None, (table.about["remark"], *table.remarks())):
+            print(line, file=out)
         if arguments.json == "-":
             json.dump(table.as_dict(), sys.stdout, indent=2)
         elif arguments.json:

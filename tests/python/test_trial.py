@@ -67,11 +67,15 @@ class Descriptions(unittest.TestCase):
         self.assertEqual(FOLDER.name, "layouts")
 
     def test_examples(self):
-        """Those of the public policies are read, and each is in the script that runs them."""
+        """Those of the public policies are read, and each is in the script that runs them; one without is described by what comes with it."""
         sys.path.insert(0, str(ROOT / "scripts"))
         import public_policies
         names = {path.stem for path in (ROOT / "examples/trial").glob("*.ini")}
-        self.assertEqual(names, set(public_policies.POLICIES))
+        self.assertLessEqual(names, set(public_policies.POLICIES))
+        for name, (_, model, policy, *_) in public_policies.POLICIES.items():
+            self.assertTrue(name in names or policy.endswith(".onnx"), name)
+            for file in (model, policy):
+                self.assertTrue(file.startswith("/") or file.split("/")[0] in public_policies.REPOSITORIES, file)
         for name in names:
             Description(ROOT / f"examples/trial/{name}.ini")
 
@@ -592,6 +596,16 @@ class Trials(unittest.TestCase):
         self.assertAlmostEqual(row.mean("sinkage"), wanted["penetration"], delta=0.05 * wanted["penetration"])
 
 
+class Remarks(unittest.TestCase):
+    def test_rigid(self):
+        """Falls and standing on rigid ground are said; a command of 0, and other grounds, are not."""
+        def row(ground, command, speed, falls):
+            return trials.Row(ground, (command, 0, 0), [trials.Walk(k, 10, "tilt" if k < falls else "time", speed, 0, None, 1, 0) for k in range(4)])
+        for one, line in ((row("rigid", 0.5, 0.4, 0), ""), (row("rigid", 0.5, 0.4, 2), ""), (row("rigid", 0.5, 0.4, 3), "falls at 0.5 m/s.*--check"),
+                          (row("rigid", 0.5, 0.1, 0), "stands at 0.5 m/s; a dead zone.*--speed 1$"), (row("rigid", 0, 0, 0), ""), (row("grass", 0.5, 0, 4), "")):
+            self.assertRegex(" ".join(trials.Table({}, [one]).remarks()), f"^{'rigid: it ' if line else ''}{line}{'' if line else '$'}")
+
+
 class Command(unittest.TestCase):
     def run_main(self, *arguments):
         out, error = io.StringIO(), io.StringIO()
@@ -620,7 +634,7 @@ class Command(unittest.TestCase):
                 self.assertIn(wanted, out)
             status, out, _ = self.run_main("--keys")
             self.assertIn("[actuator]", out)
-            for arguments, line in (((model,), "needs MODEL, POLICY"), ((model, policy, "--describe", "nobody"), "no file 'nobody'"),
+            for arguments, line in (((model,), "needs MODEL and POLICY"), ((model, policy), "needs --describe"), ((model, policy, "--describe", "nobody"), "no file 'nobody'"),
                                     ((model, policy, *describe, "--set", "a"), "KEY=VALUE"), ((model, policy, *describe, "--set", "policy.x=1"), "no key 'x'"),
                                     ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--ground", "soup"), "soup"),
                                     ((folder / "no.xml", policy, *describe), "no file"), ((folder / "bad.xml", policy, *describe), "bodies"),
