@@ -1,14 +1,14 @@
-/* A hopper plans a jump to a height off loose sand, as Hubicki, Aguilar, Goldman and Ames (IROS 2016)
- * planned those of theirs off poppy seeds: a body and a foot, between them a spring whose end a
- * motor moves through knots in time.
+/* A hopper plans a jump to a height off loose sand, as Hubicki, Aguilar, Goldman and Ames (IROS
+ * 2016) planned those of theirs off poppy seeds: a body and a foot, between them a spring whose end
+ * a motor moves through knots in time.
  *
- * Gauss-Newton on the apex h(a) of the knots a: the change that reaches the target, and of these the
- * one with the least sum of (da_i - da_{i-1})^2, so that the motor stays smooth. With g = dh/da
+ * Gauss-Newton on the apex h(a) of the knots a: the change that reaches the target, and of these
+ * the one with the least sum of (da_i - da_{i-1})^2, so that the motor stays smooth. With g = dh/da
  *
  *     da = Q^-1 g (target - h)/(g Q^-1 g),   Q^-1_ij = min(i, j) + 1
  *
- * g includes what the ground remembers: each number is the difference of a roll-out that begins with
- * a copy of the ground's block. */
+ * g includes what the ground remembers: each number is the difference of a roll-out that begins
+ * with a copy of the ground's block. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

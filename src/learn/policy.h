@@ -24,9 +24,9 @@ float *policy_parameters(Policy *policy); /* flat, policy_parameter_count() */
 int policy_take_networks(Policy *policy, const Policy *from);
 
 /* Deterministic action and estimates for `rows` histories (z = mu). history
- * [rows][frames*observation + scan], actions [rows][actions] (mean), estimates [rows][estimates] (may be
- * NULL), latent [rows][latent] modulated z~ (may be NULL). Rows are processed in fixed chunks over
- * the pool (NULL: caller's thread). One caller at a time per policy. */
+ * [rows][frames*observation + scan], actions [rows][actions] (mean), estimates [rows][estimates]
+ * (may be NULL), latent [rows][latent] modulated z~ (may be NULL). Rows are processed in fixed
+ * chunks over the pool (NULL: caller's thread). One caller at a time per policy. */
 void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
                 float *estimates, float *latent);
 /* The same actions from an actor that gets other numbers (NULL: its own), and all that passes

@@ -118,8 +118,8 @@ TEST(derivatives_where_friction_turned) {
     expect_scores("turned round", scores, count / 200, (Score[SCORES]){{0}});
 }
 
-/* Bool: an element of foot 0, pressed, leaves faster than it came, after the free motion alone was to
- * take it into virgin ground, faster. */
+/* Bool: an element of foot 0, pressed, leaves faster than it came, after the free motion alone was
+ * to take it into virgin ground, faster. */
 static int is_thrown(const Kit *kit) {
     const FootScratch *foot = &kit->scratch->foot[0];
     int thrown = 0;

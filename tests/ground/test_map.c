@@ -57,8 +57,8 @@ TEST(test_shapes) {
     mild_map_destroy(map);
 }
 
-/* Blocks of 0.7 m with the origin in the middle of one: each level, at 0, half or all of what |x| of
- * its middle allows; 8 x 8 of them, then again. */
+/* Blocks of 0.7 m with the origin in the middle of one: each level, at 0, half or all of what |x|
+ * of its middle allows; 8 x 8 of them, then again. */
 TEST(test_blocks) {
     enum { BLOCKS = 8 };
     static const double away[BLOCKS] = {0.0, 0.7, 1.4, 2.1, 2.8, 2.1, 1.4, 0.7}; /* [m] */

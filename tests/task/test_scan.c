@@ -1,5 +1,5 @@
-/* The height scan against the ground read at points turned by hand: geometry, imprints, what is old,
- * noise, mirror image. */
+/* The height scan against the ground read at points turned by hand: geometry, imprints, what is
+ * old, noise, mirror image. */
 #include "env/task/policy_keys.h"
 #include "env/task/scan.h"
 #include "task_kit.h"

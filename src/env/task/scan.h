@@ -1,5 +1,5 @@
-/* What a robot sees of the ground (docs/task.md section 5): a height scan, rows of points across its
- * heading, from behind it to ahead of it. A number is the height of the surface there, imprints
+/* What a robot sees of the ground (docs/task.md section 5): a height scan, rows of points across
+ * its heading, from behind it to ahead of it. A number is the height of the surface there, imprints
  * included, over that on which the base would be at its nominal height.
  *
  * What is seen is old: a scan is taken every scan_hold policy steps and shown scan_delay later. So

@@ -90,8 +90,8 @@ int task_critic_ground(const TaskShape *shape);
 /* Numbers of the ground in the critic's input (task_ground_numbers). */
 enum { TASK_GROUND_NUMBERS = 12 };
 
-/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i of a frame and, behind the newest one, the
- * scan; and actions alike. */
+/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i of a frame and, behind the newest one,
+ * the scan; and actions alike. */
 typedef struct {
     int observation_index[TASK_OBSERVATION_MAX + TASK_SCAN_MAX];
     float observation_sign[TASK_OBSERVATION_MAX + TASK_SCAN_MAX];

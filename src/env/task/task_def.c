@@ -234,8 +234,8 @@ const MildField task_fields[] = {
     T(noise_omega, D, 1, 0, 5, "[rad/s] bound of the uniform noise of the angular velocity"),
     T(noise_gravity, D, 1, 0, 1, "[-] bound of the uniform noise of the unit vector along gravity"),
     T(scan, MILD_FIELD_INT, 1, 0, 64,
-      "[-] points across the height scan, by which actor, encoder and critic see the ground; 0: they "
-      "do not"),
+      "[-] points across the height scan, by which actor, encoder and critic see the ground; 0: "
+      "they do not"),
     T(scan_ahead, D, 2, -2, 4,
       "[m] its rearmost and foremost points, from the base along its heading"),
     T(scan_pitch, D, 1, 0.01, 1, "[m] from point to point, along and across"),

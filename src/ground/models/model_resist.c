@@ -1,5 +1,5 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
-/* Models of resistive force theory (plate.h), ecc_quasi and ecc_quasi_3d, for the slots of a foot. */
+/* Models of resistive force theory (plate.h), ecc_quasi and ecc_quasi_3d, for a foot's slots. */
 #include "ground/law/model.h"
 #include "ground/law/plate.h"
 #include "ground/step/scratch.h"
