@@ -243,7 +243,8 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
     const TaskShape shape = task_shape(task, robot);
     memcpy(file.magic, WEB_MAGIC, sizeof file.magic);
     file.bytes = (int32_t)sizeof file;
-    if (policy_def(policy)->observation != shape.observation) {
+    if (policy_def(policy)->observation != shape.observation ||
+        policy_def(policy)->scan != shape.scan) {
         return stop("the policy is another robot's");
     }
     robot_set_shells(robot, task->shells_stand);

@@ -272,13 +272,14 @@ static void make_map(Map *map, const std::string &kind, nb::handle heights, nb::
 }
 
 static void bind_map(nb::module_ &module) {
-    nb::class_<Map>(module, "Map",
-                    "Shape of the ground and pattern of its materials; it never changes.\n\n"
-                    "kind: flat, slope, steps, waves, rough, image or mixed. heights: (rows, "
-                    "columns) [-]\nof kind image, row 0 has the largest y. patches: none, stripes, "
-                    "checker or image;\nlabels: (rows, columns) whole numbers of the latter. "
-                    "Further fields: cell, size,\namplitude, wavelength, slope, seed, patch_size, "
-                    "border (docs/task.md section 11).")
+    nb::class_<Map>(
+        module, "Map",
+        "Shape of the ground and pattern of its materials; it never changes.\n\n"
+        "kind: flat, slope, steps, waves, rough, blocks, image or mixed. heights: (rows, "
+        "columns) [-]\nof kind image, row 0 has the largest y. patches: none, stripes, "
+        "checker or image;\nlabels: (rows, columns) whole numbers of the latter. "
+        "Further fields: cell, size,\namplitude, wavelength, slope, seed, patch_size, "
+        "border (docs/task.md section 11).")
         .def("__init__", make_map, nb::arg("kind") = "flat", nb::kw_only(),
              nb::arg("heights") = nb::none(), nb::arg("labels") = nb::none(),
              nb::arg("patch_count") = 1, nb::arg("fields"))

@@ -25,7 +25,7 @@
 #include "robot/engine/measure.h"
 #include "robot/engine/step.h"
 
-/* [B] Of a TaskEnv and its frames. */
+/* [B] Of a TaskEnv, its frames and poses. */
 MILD_HD size_t env_stride(const TaskDef *def, const TaskShape *shape) {
     return task_env_head_bytes(shape, task_frames_held(def));
 }

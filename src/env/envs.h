@@ -111,7 +111,7 @@ MildStatus envs_load_progress(Envs *envs, const TaskProgress *progress, MildErro
 
 /* [B] Of one robot. */
 typedef struct {
-    size_t task;   /* its TaskEnv and the frames of its history, for MuJoCo also its ground */
+    size_t task;   /* its TaskEnv, frames and poses; for MuJoCo also its ground */
     size_t engine; /* between the parts of a step, and what the task reads of it */
     size_t ground; /* of mild/batch.h */
     size_t rest;   /* what passes between engine and ground; shares of model, task and grounds */

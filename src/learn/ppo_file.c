@@ -411,9 +411,10 @@ MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_
 }
 
 MildStatus ppo_file_is_whole(const char *path, int *whole, MildError *error) {
-    Safetensors *file = safetensors_read(path, error);
+    MildError cause = {0};
+    Safetensors *file = safetensors_read(path, &cause);
     if (!file) {
-        return error->status;
+        return mild_fail(error, cause.status, "%s", cause.text);
     }
     *whole = safetensors_find(file, "train.history") != NULL;
     safetensors_destroy(file);

@@ -124,9 +124,9 @@ TEST(test_slope_friction) {
 }
 
 static MildMap *random_map(uint64_t *random) {
-    static const MildMapKind kinds[5] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
-                                         MILD_MAP_SLOPE, MILD_MAP_MIXED};
-    MildMapDef def = shape(kinds[kit_index(random, 5)], 0.0, kit_uniform(random, 0.15, 1.0));
+    static const MildMapKind kinds[6] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
+                                         MILD_MAP_SLOPE, MILD_MAP_MIXED, MILD_MAP_BLOCKS};
+    MildMapDef def = shape(kinds[kit_index(random, 6)], 0.0, kit_uniform(random, 0.15, 1.0));
     def.seed = (uint64_t)kit_index(random, 1000);
     def.size = def.kind == MILD_MAP_MIXED ? 10.0 : 4.0;
     def.amplitude = kit_uniform(random, 0.0, 0.05) * fmin(1.0, def.wavelength / 0.2);

@@ -107,8 +107,7 @@ static void add_rules(Description *d, const Export *export) {
 
 MildStatus describe(const Export *export, Description *description, MildError *error) {
     TaskGains gains;
-    MildStatus status = task_def_check_plain(export->task, "export", error);
-    status = status == MILD_OK ? task_gains(export->task, export->robot, &gains, error) : status;
+    const MildStatus status = task_gains(export->task, export->robot, &gains, error);
     description->count = 0;
     if (status == MILD_OK) {
         add(description, "producer", "mild %s", export->version);

@@ -29,9 +29,18 @@ enum { KEYS = sizeof keys / sizeof *keys };
 /* A key of older files, which has no effect: a shell in soft ground ends no episode. */
 static const char gone[] = "shell_depth";
 
+/* Bool: of a height scan. A policy without one does not name it, so that policies and checkpoints
+ * of before there were scans are the same. */
+static int is_scan_key(const char *name) {
+    return strncmp(name, "scan", strlen("scan")) == 0;
+}
+
 void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {
     size_t used = 0;
     for (int i = 0; i < KEYS && used < size; i++) {
+        if (def->scan == 0 && is_scan_key(keys[i])) {
+            continue;
+        }
         const MildField *field = mild_field_find(task_fields, task_field_count, keys[i], NULL);
         used += (size_t)snprintf(text + used, size - used, "%s%s = ", i > 0 ? "; " : "", keys[i]);
         if (used < size) {

@@ -32,7 +32,8 @@ typedef struct {
     int noisy;     /* bool: as the policy sees it; else as it is */
 } TaskScan;
 
-/* Poses that an environment with a scan remembers: of the last policy steps. */
+/* Poses that an environment with a scan remembers: of the last policy steps, more than the longest
+ * randomize.scan_delay (0.2 s) and scan_hold (10) together reach back. */
 enum { TASK_SCAN_POSES = 32 };
 
 /* [TASK_SCAN_POSES] Behind the frames of an environment, whose numbers take `frames` bytes. */

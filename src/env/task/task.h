@@ -42,12 +42,12 @@ typedef struct {
 
 /* ---- the block ---- */
 
-/* One block: TaskEnv with its frames, TaskRest, the history, the ground memory, the state of
+/* One block: TaskEnv with its frames and poses, TaskRest, the history, the ground memory, the state of
  * TaskDef.motors; a multiple of 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
 TaskRest *task_env_rest(TaskEnv *env);
 const MildTerrain *task_env_terrain(const TaskEnv *env); /* of TaskRest */
-/* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
+/* [shape.history] What the policy sees: five means of older frames, the newest frame, the scan. */
 float *task_env_history(TaskEnv *env);
 const float *task_env_frame(TaskEnv *env); /* [shape.observation] the newest frame of it */
 MildGround *task_env_ground(TaskEnv *env);

@@ -5,7 +5,7 @@
 /* One row for each environment, or the rows of one. Pointers may be NULL, but the batch engine
  * needs the history. Widths: TaskShape. */
 typedef struct {
-    float *history;  /* [envs][frames][observation] with sensor noise, the newest frame last */
+    float *history;  /* [envs][history] with sensor noise: frames, the newest last, and a scan */
     float *critic;   /* [envs][critic] without noise */
     float *estimate; /* [envs][estimates] true velocities and heights: the regression targets */
     float *frame;    /* [envs][observation] the newest frame of the history: the decoder's target */

@@ -193,7 +193,8 @@ static int64_t checkpoint_below(const TrainRun *run, int64_t limit) {
 }
 
 /* Loads the newest checkpoint that is not damaged (by a power loss or a broken disk). A checkpoint
- * of another config is an error, because the earlier ones have that config too. */
+ * of another config is an error, because the earlier ones have that config too, and so is a lack of
+ * memory. */
 static MildStatus resume(TrainRun *run, MildError *error) {
     int64_t number = checkpoint_below(run, INT64_MAX);
     for (;;) {
@@ -206,7 +207,7 @@ static MildStatus resume(TrainRun *run, MildError *error) {
         if (status == MILD_OK && leads(run) && run->callbacks.resumed) {
             run->callbacks.resumed(run->callbacks.self, path);
         }
-        if (status == MILD_OK || status == MILD_ERROR_ARGUMENT) {
+        if (status == MILD_OK || status == MILD_ERROR_ARGUMENT || status == MILD_ERROR_MEMORY) {
             return status;
         }
         number = checkpoint_below(run, number);

@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/paths.h"
 #include "device/ranks/device.h"
+#include "env/task/policy_keys.h"
 #include "learn/cuda/learner.h"
 #include "run/train/experiment.h"
 
@@ -34,6 +35,15 @@ void train_destroy(Trainer *trainer) {
 }
 
 /* The networks of a policy file take the place of the random ones. */
+/* Bool: the points of the ground that `other` sees, if it does, are those of `own`. */
+static int sees_the_same(const TaskDef *own, const PolicyDef *other) {
+    TaskDef theirs = *own;
+    return other->scan == 0 || (task_policy_keys_read(&theirs, other->task, NULL) == MILD_OK &&
+                                theirs.scan == own->scan && theirs.scan_pitch == own->scan_pitch &&
+                                theirs.scan_ahead[0] == own->scan_ahead[0] &&
+                                theirs.scan_ahead[1] == own->scan_ahead[1]);
+}
+
 static MildStatus start_policy(Trainer *trainer, MildError *error) {
     const char *path = trainer->def.train.start;
     MildError cause = {0};
@@ -50,6 +60,12 @@ static MildStatus start_policy(Trainer *trainer, MildError *error) {
         status = mild_fail(error, MILD_ERROR_FORMAT,
                            "train.start: %s has other networks or another robot than this config "
                            "asks for; see sections [policy], [ppo] and train.robot",
+                           path);
+    }
+    if (status == MILD_OK && !sees_the_same(&trainer->def.task, other)) {
+        status = mild_fail(error, MILD_ERROR_FORMAT,
+                           "train.start: %s sees other points of the ground than task.scan, "
+                           "scan_ahead and scan_pitch say",
                            path);
     }
     policy_destroy(start);
