@@ -31,7 +31,7 @@ static MildStatus write_files(const Exporting *e, MildError *error) {
                            .note = note,
                            .version = build_version(),
                            .in_double = e->in_double};
-    status = task_def_check_plain(&c->task, "export", error);
+    status = task_def_check_plain(&c->task, c->policy, error);
     if (status == MILD_OK) {
         status = network_layout(&network, policy_def(policy), error);
     }
