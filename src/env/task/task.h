@@ -42,8 +42,8 @@ typedef struct {
 
 /* ---- the block ---- */
 
-/* One block: TaskEnv with its frames and poses, TaskRest, the history, the ground memory, the state of
- * TaskDef.motors; a multiple of 64. */
+/* One block: TaskEnv with its frames and poses, TaskRest, the history, the ground memory, the state
+ * of TaskDef.motors; a multiple of 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
 TaskRest *task_env_rest(TaskEnv *env);
 const MildTerrain *task_env_terrain(const TaskEnv *env); /* of TaskRest */
