@@ -3,6 +3,8 @@ import copy
 
 import numpy as np
 
+from ._ground import Terrain
+
 INPUTS = "position", "rotation", "velocity", "free_velocity", "inverse_inertia"
 
 
@@ -10,7 +12,9 @@ class Step:
     """What solves of one ground give by some of their inputs.
 
     by: names of INPUTS, which are its arrays, and of numbers of its material, if it is level and of one material. What is not named stays as
-    the ground has it. What the ground remembers is an input that has no derivative: every call takes what it remembers then, and leaves it."""
+    the ground has it. What the ground remembers is an input that has no derivative: every call takes what it remembers then, and leaves it.
+    A call overwrites the named arrays and numbers of the ground; those of the last call stay in it. Raises ValueError for a wrong name or a
+    wrong number of inputs, RuntimeError for a step that has not converged."""
 
     def __init__(self, ground, by):
         self.ground, self.by = ground, tuple(by)
@@ -29,12 +33,12 @@ class Step:
         ground, feet, dt = self.ground, self.ground.feet, self.ground.dt
         if self.fields:
             state, soil = ground.state, copy.copy(ground.terrain.materials[0])
-            for name, value in zip(self.by, inputs):
+            for name, value in zip(self.by, inputs, strict=True):
                 if name in self.fields:
                     setattr(soil, name, float(value))
             ground.state = state  # ends the step before, so that the terrain changes now
-            ground.terrain, ground.state = soil, state  # and the memory stays that of the call
-        for name, value in zip(self.by, inputs):
+            ground.terrain, ground.state = Terrain(soil, height=ground.terrain.height), state  # and the memory stays that of the call
+        for name, value in zip(self.by, inputs, strict=True):
             if name in INPUTS:
                 getattr(ground, name)[...] = value
         if not ground.solve():
@@ -75,11 +79,27 @@ class Step:
 
 def torch(ground, by):
     """A function of tensors of float64, one for each name in `by` (Step), that returns (wrench, new_velocity), (feet, 6) each: force and
-    torque on each foot [N, N m], its twist after the step. On the CPU. torch.func.vmap solves one after the other. ground.advance() after a
-    call keeps its step."""
+    torque on each foot [N, N m], its twist after the step. On the CPU. torch.func.vmap solves one after the other. First derivatives only:
+    second ones raise RuntimeError. ground.advance() after a call keeps its step."""
     import torch as th
 
     step = Step(ground, by)
+
+    class First(th.autograd.Function):
+        """Products with the slopes, which follow the inputs in a way that nobody computes: no once_differentiable, which torch.func drops."""
+        generate_vmap_rule = True
+
+        @staticmethod
+        def forward(given, *rest):
+            return tuple(th.tensordot(given, slope, 3) for slope in rest[: len(step.by)])
+
+        @staticmethod
+        def setup_context(ctx, inputs, output):
+            pass
+
+        @staticmethod
+        def backward(ctx, *given):
+            raise RuntimeError("gradients: first derivatives only")
 
     class Solve(th.autograd.Function):
         @staticmethod
@@ -90,12 +110,11 @@ def torch(ground, by):
         @staticmethod
         def setup_context(ctx, inputs, output):
             ctx.mark_non_differentiable(*output[2:])
-            ctx.save_for_backward(*output[2:])
+            ctx.save_for_backward(*output[2:], *inputs)
 
         @staticmethod
         def backward(ctx, wrench, velocity, *_):
-            given = th.stack([wrench, velocity])
-            return tuple(th.tensordot(given, slope, 3) for slope in ctx.saved_tensors)
+            return First.apply(th.stack([wrench, velocity]), *ctx.saved_tensors)
 
         @staticmethod
         def vmap(info, in_dims, *inputs):
@@ -108,7 +127,8 @@ def torch(ground, by):
 
 def jax(ground, by):
     """The same of JAX's arrays, in its jit, grad and vmap (one after the other). With jax_enable_x64 numbers are float64, else float32, which
-    the derivatives keep to 1e-6. What the compiled function runs on is the ground as it is then; advance() is not among JAX's values."""
+    the derivatives keep to 1e-6. What the compiled function runs on is the ground as it is then; advance() is not among JAX's values: wait for the results
+    (jax.block_until_ready) before it. First derivatives only."""
     import jax as j
     import jax.numpy as jnp
 

@@ -80,6 +80,18 @@ class Steps(unittest.TestCase):
         self.assertEqual(state, ground.state)
         np.testing.assert_array_equal(step.solve([inputs[5]])[0], first[0])
 
+    def test_height(self):
+        """A level terrain keeps its height when a number of its material changes."""
+        ground, inputs = made()
+        ground.terrain = mild.Terrain(["foam45"], height=-0.02)
+        ground.position[:] -= [0, 0, 0.02]
+        wanted = gradients.Step(ground, ["free_velocity"]).solve([inputs[3]])[0]
+        got = gradients.Step(ground, ["k_pen"]).solve([inputs[5]])[0]
+        self.assertEqual(ground.terrain.height, -0.02)
+        np.testing.assert_array_equal(got, wanted)
+        with self.assertRaises(ValueError):
+            gradients.Step(ground, ["k_pen", "mu"]).solve([inputs[5]])
+
     def test_refused(self):
         ground, _ = made()
         ground.terrain = mild.Terrain(["foam45", "sand_loose"])
@@ -127,6 +139,20 @@ class Torch(unittest.TestCase):
         solve = gradients.torch(ground, ["free_velocity", "mu"])
         tensors = [torch.tensor(inputs[BY.index(name)], requires_grad=True) for name in ("free_velocity", "mu")]
         self.assertTrue(torch.autograd.gradcheck(solve, tensors, eps=1e-6, rtol=1e-5, atol=1e-3))
+
+    def test_second(self):
+        """There are first derivatives only, and a second one is refused."""
+        import torch
+
+        ground, inputs = made()
+        solve = gradients.torch(ground, ["free_velocity"])
+        free = torch.tensor(inputs[3], requires_grad=True)
+        slope, = torch.autograd.grad((solve(free)[0] ** 2).sum(), free, create_graph=True)
+        with self.assertRaisesRegex(RuntimeError, "first derivatives only"):
+            slope.sum().backward()
+        twice = torch.func.grad(lambda one: torch.func.grad(lambda one: (solve(one)[0] ** 2).sum())(one).sum())
+        with self.assertRaisesRegex(RuntimeError, "first derivatives only"):
+            twice(free.detach())
 
     def test_vmap(self):
         import torch
