@@ -3,21 +3,26 @@
 import csv
 import dataclasses
 import functools
+import hashlib
+import importlib.util
 import io
 import json
+import math
 import os
 import pathlib
+import re
 import sys
 
 import numpy as np
 
 from . import networks, trials
-from .describe import Description
+from .describe import KEYS, TABLES, Description
 
 CELL = 0.0195**2  # [m^2] of an element for which presets give k_pen
 PRESSURE = 6.7e3  # [Pa] at which `mild info grounds` gives the stiffness of a preset
 MEASURED = ("rubber_tile", "running_track", "artificial_turf", "gym_mat", "carpet", "groomed_snow", "moist_sand", "dry_sand_close", "dry_sand_loose")
 PER_DECADE = 40  # places of the grid, 6 % apart
+SAME = 1e-9  # relative: values that are one place of the grid, on any processor
 ROUND = 4  # trials that are chosen at once; a round does not depend on the number of processes
 PRIOR = 0.5  # exponent: shallow curves are taken for likelier
 WITHIN = 1.3  # a sweep ends when its 90 % interval is no wider than this factor
@@ -172,7 +177,7 @@ class Sweep:
         """Rows of a CSV: value, trials, upright, and the chance to stay up with its 90 % interval."""
         rows = []
         for value, chance, low, high in zip(self.curve.values, *self.curve.fit()):
-            here = [walk["end"] == "time" for walk in self.each if walk["value"] == value]
+            here = [walk["end"] == "time" for walk in self.each if math.isclose(walk["value"], value, rel_tol=SAME)]
             rows.append([f"{value:.4g}", len(here), sum(here), f"{chance:.3f}", f"{low:.3f}", f"{high:.3f}"])
         return rows
 
@@ -182,19 +187,15 @@ class Sweep:
         first, last = (f"{value:.3g}" for value in self.about["range"])
         count = f"{sum(walk['end'] == 'time' for walk in self.each)} of {len(self.each)} trials upright"
         if verdict in ("never_falls", "always_falls"):
-            side = f" < {high:.3g}" if high else f" > {low:.3g}" if low else ""
-            return f"{name} S50{side} {unit}".rstrip() + f": it {verdict.replace('_', ' ')} from {first} to {last}; {count}"
+            side = f"< {high:.3g} {unit}: below" if high else f"> {low:.3g} {unit}: above" if low else "is outside"
+            return f"{name} S50 {side} all that was tried, {first} to {last}; {count}".replace(" :", ":")
         text = f"{name} S50 {'-' if s50 is None else f'{s50:.3g}'} {unit}".rstrip()
         text += f", 90 % {f'below {first}' if low is None else f'{low:.3g}'} to {f'above {last}' if high is None else f'{high:.3g}'}; {count}"
         return text + ("" if verdict == "inside" else f"; wider than a factor {WITHIN:g}")
 
     def plot(self, path):
         """Draws the curve, the trials and the measured grounds. Raises RuntimeError without matplotlib."""
-        try:
-            from matplotlib.figure import Figure
-        except ImportError:
-            raise RuntimeError("plot: needs matplotlib; `pip install matplotlib`") from None
-        figure = Figure(figsize=(8, 4.2), layout="constrained")
+        figure = _figure()(figsize=(8, 4.2), layout="constrained")
         axes, name = figure.add_subplot(), self.about["sweep"]
         mean, low, high = self.curve.fit()
         axes.fill_between(self.curve.values, low, high, color="C0", alpha=0.2, linewidth=0)
@@ -215,11 +216,52 @@ class Sweep:
         figure.savefig(path, dpi=150)
 
 
+def _figure():
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise RuntimeError("plot: needs matplotlib; `pip install matplotlib`") from None
+    return Figure
+
+
 def write(path, text):
     """Writes a whole file or none."""
     part = pathlib.Path(f"{path}.part")
     part.write_text(text, encoding="utf-8")
     os.replace(part, path)
+
+
+def _sha256(*parts):
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()
+
+
+def _of_model(model):
+    """sha256 of an MJCF, text or file, and of the files that it includes."""
+    if str(model).lstrip().startswith("<"):
+        return _sha256(str(model).encode())
+    files = [pathlib.Path(model)]
+    for file in files:
+        names = re.findall(rb"<include\s[^>]*?file\s*=\s*[\"']([^\"']+)", file.read_bytes())
+        files += [one for one in (files[0].parent / os.fsdecode(name) for name in names) if one.is_file() and one not in files]
+    return _sha256(*(file.read_bytes() for file in files))
+
+
+def _of_policy(policy):
+    """sha256 of a policy's file and of its weights beside it, or of the file that has its code."""
+    place, _, name = str(policy).rpartition(":")
+    origin = importlib.util.find_spec(place).origin if name and re.fullmatch(r"[\w.]+", place) and not place.endswith(".py") else place or policy
+    files = [pathlib.Path(one) for one in (policy, f"{policy}.data", origin)]
+    found = [file.read_bytes() for file in files if file.is_file()]
+    if not found:
+        raise ValueError(f"policy: there is no file '{policy}'")
+    return _sha256(*found)
+
+
+def _of_description(description):
+    """sha256 of what a description says, from wherever."""
+    tables = {table: [(pattern.pattern, value) for pattern, value in getattr(description, table)] for table in TABLES}
+    terms = [(term.name, term.scale.tolist(), term.count) for term in description.terms]
+    return _sha256(json.dumps([{section: getattr(description, section) for section in KEYS}, tables, terms]).encode())
 
 
 def _recorded(path, about):
@@ -228,12 +270,19 @@ def _recorded(path, about):
         return []
     try:
         found = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
-        other = [key for key in about if found[key] != json.loads(json.dumps(about[key]))]
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"json: {path} is there, and is no sweep; name another file") from None
+    except ValueError:
+        found = None
+    if not isinstance(found, dict) or "sweep" not in found:
+        raise ValueError(f"json: {path} is there, and is no sweep; name another file")
+    other = next((key for key in about if found.get(key) != json.loads(json.dumps(about[key]))), None)
     if other:
-        raise ValueError(f"json: {path} is of another sweep, {other[0]} {found[other[0]]} instead of {about[other[0]]}; name another file or remove it")
-    return found["each"]
+        before, now = (str(one)[:12] if other.endswith("sha256") else one for one in (found.get(other), about[other]))
+        raise ValueError(f"json: {path} is of another sweep, {other} {before} instead of {now}; name another file or remove it")
+    each, keys = found.get("each"), {"value", *(field.name for field in dataclasses.fields(trials.Walk))}
+    for walk in each if isinstance(each, list) else [None]:
+        if not isinstance(walk, dict) or set(walk) != keys or not isinstance(walk["value"], (int, float)) or not isinstance(walk["end"], str):
+            raise ValueError(f"json: {path} is broken: 'each' must be a list of trials; name another file or remove it")
+    return each
 
 
 def sweep(model, policy, describe, quantity, *, ground=None, limits=None, command=(0.5, 0.0, 0.0), most=60, seconds=10.0, seed=1, noise=1.0,
@@ -242,7 +291,8 @@ def sweep(model, policy, describe, quantity, *, ground=None, limits=None, comman
 
     model, policy, describe: files, as in mild.trial. quantity: stiffness, friction, slip, damping. ground: the preset that has all
     numbers but those of the sweep; None: QUANTITIES names it. limits: (low, high) [unit of the quantity]. most: number of trials at most. file: JSON, whole after
-    every trial; a sweep that finds its own file goes on from there. report: called with the Sweep after every trial. The result does
+    every trial; a sweep that finds its own file goes on from there, and refuses
+    that of another robot, policy, description or MuJoCo, by their sha256. report: called with the Sweep after every trial. The result does
     not depend on jobs, nor on interruptions. Other arguments, errors: mild.trial."""
     if quantity not in QUANTITIES:
         raise ValueError(f"sweep: '{quantity}' is none of {', '.join(QUANTITIES)}")
@@ -256,7 +306,12 @@ def sweep(model, policy, describe, quantity, *, ground=None, limits=None, comman
     for key in ("model", *q.fields(low)):
         if f"ground__{key}" in attributes:
             raise ValueError(f"attach: ground.{key} is what the sweep sets")
-    about = {"version": trials._version(), "model": trials._place(model), "policy": trials._place(policy), "describe": str(describe), "sweep": quantity,
+    import mujoco
+
+    _load.cache_clear()  # files may have changed
+    about = {"version": trials._version(), "mujoco": mujoco.mj_versionString(), "model": trials._place(model), "policy": trials._place(policy),
+             "describe": str(describe), "model_sha256": _of_model(model), "policy_sha256": _of_policy(policy),
+             "describe_sha256": _of_description(Description(describe, changes)), "sweep": quantity,
              "unit": q.unit, "ground": ground, "range": [float(low), float(high)], "command": [float(one) for one in command],
              "seconds": float(seconds), "seed": int(seed), "noise": float(noise), "changes": changes, "attributes": attributes}
     result = Sweep(about, Curve(low, high, q.rises), [])
@@ -279,7 +334,7 @@ def _rounds(result, found, what, most, file, report, run):
         count = min(ROUND, most - len(each))
         values = curve.choose(count) if each else [float(curve.values[k]) for k in np.linspace(0, len(curve.values) - 1, ROUND).round().astype(int)[:count]]
         ready = found[len(each) : len(each) + count]
-        if [walk["value"] for walk in ready] != values[: len(ready)]:
+        if any(not math.isclose(walk["value"], value, rel_tol=SAME) for walk, value in zip(ready, values)):
             raise ValueError(f"json: {file} has trials that this sweep would not choose; name another file or remove it")
         first = len(each)
         walks = run(_walk, [(what, about["sweep"], about["ground"], tuple(about["command"]), value, about["seed"] + first + k)
@@ -306,9 +361,22 @@ def run(arguments, changes, attributes):
     if len(grounds) != 1 or grounds == ["rigid"] or len(arguments.speed) != 1 or arguments.video or len(arguments.range or (0, 1)) != 2:
         raise ValueError("sweep: takes one soft ground, one speed, --range LOW,HIGH, and no video")
     whole = arguments.json if arguments.json != "-" else None
+    for option, file in (("json", whole), ("csv", arguments.csv), ("plot", arguments.plot)):  # before an hour of walks
+        if file and not pathlib.Path(file).absolute().parent.is_dir():
+            raise ValueError(f"{option}: there is no folder '{pathlib.Path(file).parent}'")
+    if arguments.plot:
+        _figure()
+    most = 60 if arguments.trials is None else arguments.trials
+
+    def report(result):
+        count = len(result.each)
+        if count % ROUND == 0 or count == most:
+            walks = ", ".join(f"{walk['value']:.3g} {'upright' if walk['end'] == 'time' else 'fell'}" for walk in result.each[(count - 1) // ROUND * ROUND :])
+            print(f"{count} of at most {most} trials: {walks}", file=sys.stderr, flush=True)
+
     result = sweep(arguments.model, arguments.policy, arguments.describe, arguments.sweep, ground=grounds[0], limits=arguments.range,
-                   command=(arguments.speed[0], arguments.sideways, arguments.turn), most=60 if arguments.trials is None else arguments.trials,
-                   seconds=arguments.seconds, seed=arguments.seed, noise=arguments.noise, changes=changes, attributes=attributes, jobs=arguments.jobs, file=whole)
+                   command=(arguments.speed[0], arguments.sideways, arguments.turn), most=most,
+                   seconds=arguments.seconds, seed=arguments.seed, noise=arguments.noise, changes=changes, attributes=attributes, jobs=arguments.jobs, file=whole, report=report)
     print(result, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json == "-":
         json.dump(result.as_dict(), sys.stdout, indent=2)

@@ -142,7 +142,14 @@ class Files(unittest.TestCase):
             if stop is not None and len(result.each) == stop:
                 raise Stop
 
-        return sweep.sweep("robot.xml", "policy.onnx", "mine.ini", "stiffness", file=file, report=report, **more)
+        return sweep.sweep(*self.files, "stiffness", file=file, report=report, **more)
+
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.files = [self.folder / name for name in ("robot.xml", "policy.onnx", "mine.ini")]
+        for file, text in zip(self.files, ('<mujoco><include file="legs.xml"/></mujoco>', "1", "[observation]\ngravity = 1\n")):
+            file.write_text(text)
+        (self.folder / "legs.xml").write_text("<mujoco/>")
 
     def test_goes_on(self):
         """Interrupted anywhere, even where a round is not done, a sweep leaves a whole file, and goes on to the very same one."""
@@ -181,11 +188,55 @@ class Files(unittest.TestCase):
             kept = file.read_text()
             with self.assertRaisesRegex(ValueError, "seed 1 instead of 2"):
                 self.run_sweep(file, seed=2)
-            for wrong, line in (("{}", "is no sweep"), ('{"each": [', "is no sweep"), (kept.replace('"value": 0.1,', '"value": 0.2,'), "would not choose")):
+            whole = json.loads(kept)
+            for wrong, line in (("{}", "is no sweep"), ('{"each": [', "is no sweep"), (kept.replace('"value": 0.1,', '"value": 0.2,'), "would not choose"),
+                                ("[]", "is no sweep"), *((json.dumps({**whole, "each": each}), "s50.json is broken: .*or remove it") for each in (
+                                    None, 3, [{}], [None], [{**whole["each"][0], "value": None}],
+                                    [{key: value for key, value in whole["each"][0].items() if key != "end"}])),
+                                (json.dumps({key: value for key, value in whole.items() if key != "each"}), "s50.json is broken")):
                 file.write_text(wrong)
                 with self.assertRaisesRegex(ValueError, line):
                     self.run_sweep(file)
                 self.assertEqual(file.read_text(), wrong)
+
+    def test_changed(self):
+        """Another robot, policy or description in files of the same name is another sweep, and so is another MuJoCo; the last digits of a value
+        are not."""
+        file, texts = self.folder / "s50.json", {"robot.xml": "<mujoco/>", "legs.xml": "<mujoco></mujoco>", "policy.onnx": "2",
+                                                 "policy.onnx.data": "3", "mine.ini": "[observation]\ngravity = 2\n"}
+        self.run_sweep(file, most=8)
+        for name, text in texts.items():
+            before = (self.folder / name).read_text() if (self.folder / name).is_file() else None
+            (self.folder / name).write_text(text)
+            with self.subTest(name), self.assertRaisesRegex(ValueError, r"another sweep, (model|policy|describe)_sha256 \w{12} instead of \w{12};"):
+                self.run_sweep(file, most=8)
+            (self.folder / name).write_text(before) if before else (self.folder / name).unlink()
+        (self.folder / "mine.ini").write_text("[observation]  # as before\ngravity = 1.0\n")
+        file.write_text(file.read_text().replace('"value": 1000.0', '"value": 1000.0000000001'))
+        again = self.run_sweep(file, most=8)
+        self.assertEqual(sum(row[1] for row in again.points()), 8)
+        with unittest.mock.patch("mujoco.mj_versionString", lambda: "1.2.3"), self.assertRaisesRegex(ValueError, "mujoco .* instead of 1.2.3"):
+            self.run_sweep(file, most=8)
+
+    def test_text(self):
+        """Who falls once is not said never to fall."""
+        for name, rises, upright, line in (("stiffness", 1, True, r"S50 < 0.1 MPa/m: below all that was tried, 0.1 to 1e\+03; 29 of 30"),
+                                           ("friction", 1, False, r"S50 > 1e\+03: above all that was tried, 0.1 to 1e\+03; 1 of 30"),
+                                           ("damping", 0, True, r"S50 is outside all that was tried, 0.1 to 1e\+03; 29 of 30")):
+            curve, each = Curve(0.1, 1000, rises), []
+            for k in range(30):
+                value = curve.choose(1)[0]
+                each.append({"value": value, "end": "time" if upright == (k > 0) else "tilt"})
+                curve.add(value, upright == (k > 0))
+            self.assertRegex(str(sweep.Sweep({"sweep": name, "range": [0.1, 1000]}, curve, each)), f"^{name} {line} trials upright$")
+
+    def test_network(self):
+        """A sweep loads its network anew."""
+        with unittest.mock.patch.object(sweep.networks, "load") as load:
+            for _ in range(2):
+                self.run_sweep(None, most=1)
+                sweep._load(str(self.files[1]), str(self.files[2]), ())
+            self.assertEqual(load.call_count, 2)
 
     def test_seeds(self):
         """Trials have seeds of their own, and another seed finds the same S50 by other trials."""
@@ -212,8 +263,9 @@ class Commands(unittest.TestCase):
             for jobs in (1, 2):
                 status, out, error = self.run_main(*sweeping, "stiffness", "--seconds", "0.2", "--jobs", jobs, "--json", folder / f"{jobs}.json", "--csv",
                                                    folder / "curve.csv")
-                self.assertEqual((status, error), (0, ""))
-                self.assertRegex(out, r"^stiffness S50 < 0.1 MPa/m: it never falls from 0.1 to 1e\+03; (\d+) of \1 trials upright\n$")
+                self.assertEqual(status, 0)
+                self.assertRegex(error, r"^(\d+ of at most 60 trials: \S+ upright.*\n)+$")
+                self.assertRegex(out, r"^stiffness S50 < 0.1 MPa/m: below all that was tried, 0.1 to 1e\+03; (\d+) of \1 trials upright\n$")
             self.assertEqual((folder / "1.json").read_text(), (folder / "2.json").read_text())
             self.assertEqual(json.loads((folder / "1.json").read_text())["ground"], "rubber_tile")
             subprocess.run([sys.executable, ROOT / "tests/app/schema.py", ROOT / "docs/schema/sweep.json", folder / "1.json"], check=True)
@@ -230,7 +282,8 @@ class Commands(unittest.TestCase):
             for more, line in ((("wind",), "'wind' is none of stiffness, friction"), (("slip", "--range", "3,1"), "0 < low < high"),
                                (("slip", "--range", "3"), "--range LOW,HIGH"), (("friction", "--range", "0.1,9"), "mu"), (("friction", "--trials", 0), "more than 0"),
                                (("friction", "--ground", "rigid"), "one soft ground"), (("friction", "--speed", "0,1"), "one speed"),
-                               (("friction", "--ground", "soup"), "soup"), (("friction", "--attach", "ground.mu=1"), "ground.mu is what the sweep sets")):
+                               (("friction", "--ground", "soup"), "soup"), (("friction", "--json", folder / "no/a.json"), "json: there is no folder"),
+                               (("friction", "--csv", folder / "no/a.csv"), "csv: there is no folder"), (("friction", "--attach", "ground.mu=1"), "ground.mu is what the sweep sets")):
                 status, _, error = self.run_main(*sweeping, *more)
                 self.assertEqual((status, error.count("\n"), error.startswith("mild trial: ")), (2, 1, True), error)
                 self.assertIn(line, error)
