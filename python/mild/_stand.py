@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from .describe import by_joint, choose
+from .describe import TABLES, by_joint, choose
 from .spec import MOST, attach, floors, planes
 
 SOLE = 0.01  # [m] shapes within this of the lowest point of a foot are its sole, as in the plugin
@@ -141,6 +141,35 @@ def breadth(model):
     return order
 
 
+def numbered(model, description):
+    """Numbers @k of the joints of joint_names, those of their motors where each has one, as robots' programs count; else their own order.
+    Raises ValueError where numbers are used and only some joints have motors, in another order."""
+    import mujoco
+
+    names = joint_names(model)
+    motors = [model.joint(model.actuator_trnid[a][0]).name for a in range(model.nu) if model.actuator_trntype[a] == int(mujoco.mjtTrn.mjTRN_JOINT)]
+    motors = [name for name in motors if name in names]
+    if sorted(motors) == sorted(names):
+        return [motors.index(name) for name in names]
+    patterns = [*(description.policy["joints"] or ()), *(description.policy["observed"] or ()),
+                *(pattern.pattern for table in TABLES for pattern, _ in getattr(description, table))]
+    if motors != [name for name in names if name in motors] and any(pattern.startswith("@") for pattern in patterns):
+        raise ValueError(f"model: its joints are {', '.join(names)}, and its actuators those of {', '.join(motors)}, so that numbers of joints "
+                         "(@0) may mean either; name the joints in an ini")
+    return list(range(len(names)))
+
+
+def _ordered(patterns, names, key, tree, order, numbers):
+    """Indices of the joints that patterns name, in an order of policy.order."""
+    chosen = choose(patterns, names, key, numbers)
+    if order == "breadth":
+        return [j for j in tree if j in chosen]
+    if order == "grouped":
+        groups = [choose([pattern], names, key, numbers) for pattern in patterns or [".*"]]
+        return sorted(chosen, key=lambda j: (next(k for k, group in enumerate(groups) if j in group), tree.index(j)))
+    return chosen
+
+
 def _world(model, description, ground, painted):
     """The spec on a level floor, with the step and the integrator of the description, and what was left out."""
     import mujoco
@@ -168,15 +197,15 @@ def stand(model, description, ground, attributes, painted=False):
     if d.policy["model_joints"] not in (0, len(names)):
         raise ValueError(f"model: it has {len(names)} joints, and {d.name} {d.policy['model_joints']}, by number; give the model that its "
                          "maker runs, or name policy.joints, policy.observed, kp, kd, default and scale in an ini")
-    order, seen = choose(d.policy["joints"], names, "joints"), choose(d.policy["observed"] or d.policy["joints"], names, "observed")
-    if d.policy["order"] == "breadth":
-        order, seen = ([j for j in breadth(bare) if j in chosen] for chosen in (order, seen))
+    numbers, tree = numbered(bare, d), breadth(bare)
+    order = _ordered(d.policy["joints"], names, "joints", tree, d.policy["order"], numbers)
+    seen = _ordered(d.policy["observed"] or d.policy["joints"], names, "observed", tree, d.policy["observed_order"] or d.policy["order"], numbers)
     count = len(order)
     order += [j for j in range(len(names)) if j not in order]
-    tables = {name: by_joint(getattr(d, name), names, otherwise, name)
+    tables = {name: by_joint(getattr(d, name), names, otherwise, name, numbers)
               for name, otherwise in (("kp", 0.0), ("kd", 0.0), ("default", 0.0), ("effort", np.inf), ("armature", -1.0),
                                 ("lower", -np.inf), ("upper", np.inf))}
-    scale = by_joint(d.scale, names, 1.0, "scale")[order[:count]]
+    scale = by_joint(d.scale, names, 1.0, "scale", numbers)[order[:count]]
     if ground == "rigid" and not any(bare.geom_contype[geom] or bare.geom_conaffinity[geom] or bare.npair for geom in solids(bare)):
         raise ValueError("model: no shape of the robot collides, so that it would fall through the rigid floor")
     start = _start(bare, d, names, tables["default"])

@@ -50,8 +50,10 @@ KEYS = {
         "layout": Key(str, None, "a layout of the package, or a file beside this one, that this file completes"),
         "joints": Key(words, None, "joints of the action, in its order: regular expressions; without: all hinges and slides"),
         "observed": Key(words, None, "joints of the observation; without: those of the action"),
-        "order": Key(choice("listed", "breadth"), "listed", "listed: joints as they are named; breadth: by depth in the tree, as in Isaac Lab"),
-        "model_joints": Key(int, 0, "joints that the model must have, where they are named by number, @0 its first; 0: any"),
+        "order": Key(choice("listed", "breadth", "grouped"), "listed", "listed: joints as they are named; breadth: by depth in the tree, as in Isaac "
+                     "Lab; grouped: as they are named, those of one pattern by depth, as its preserve_order"),
+        "observed_order": Key(choice("", "listed", "breadth", "grouped"), "", "the same of the joints of the observation; without: order"),
+        "model_joints": Key(int, 0, "joints that the model must have, where they are named by number, @0 its first motor; 0: any"),
         "step": Key(float, 0.0, "[s] of physics; 0: that of the model"),
         "decimation": Key(int, 10, "steps of physics from decision to decision"),
         "delay": Key(float, 0.0, "[s] from an observation to its action, in whole steps of physics"),
@@ -174,6 +176,8 @@ class Description:
             raise ValueError(f"{self.name}: [observation] has no term; there are {', '.join([*TERMS, 'constant', 'sensor:NAME'])}")
         if self.policy["decimation"] < 1 or self.history["frames"] < 0:
             raise ValueError(f"{self.name}: policy.decimation must be 1 or more, history.frames 0 or more")
+        if not 0 <= self.policy["step"] < math.inf:
+            raise ValueError(f"{self.name}: policy.step must be 0 or more")
         if not self.clock["period"] > 0:
             raise ValueError(f"{self.name}: the observation has a clock whose period it does not say; give clock.period [s], such as "
                              "--set clock.period=0.8, or the deploy.yaml that has it")
@@ -187,8 +191,8 @@ def _parser():
     return parser
 
 
-def _read(parser, source):
-    """A file after the layout that it completes; a section [observation] replaces that of the layout."""
+def _read(parser, source, above=()):
+    """A file after the layout that it completes; a section [observation] replaces that of the layout. above: files whose layout it is."""
     if source is None:
         return
     if isinstance(source, dict):
@@ -201,14 +205,19 @@ def _read(parser, source):
             path = FOLDER / f"{source}.ini"
         if not path.is_file():
             raise ValueError(f"describe: there is no file '{source}', and no such layout; there are {', '.join(layouts())}")
-        own, folder = _parser(), path.parent
+        if path.resolve() in above:
+            raise ValueError(f"describe: {source}: policy.layout leads back to this file; name another")
+        own, folder, above = _parser(), path.parent, (*above, path.resolve())
         try:
-            own.read_dict(readers.sections(path)) if path.suffix in readers.SUFFIXES else own.read_string(path.read_text(), str(source))
+            config = path.suffix.lower() in readers.SUFFIXES
+            own.read_dict(readers.sections(path)) if config else own.read_string(path.read_text(encoding="utf-8"), str(source))
+        except UnicodeDecodeError:
+            raise ValueError(f"describe: {source}: is no text; give an ini or a config of a trainer") from None
         except configparser.Error as error:
             raise ValueError(f"describe: {' '.join(str(error).split())}") from None
     base = own.get("policy", "layout", fallback=None)
     if base:
-        _read(parser, folder / base if (folder / base).is_file() else base)
+        _read(parser, folder / base if (folder / base).is_file() else base, above)
     for section in own.sections():
         if section == "observation" or section in TABLES:
             parser.remove_section(section)
@@ -244,7 +253,7 @@ def _term(name, key, text):
     if kind not in TERMS and kind != "constant" and not kind.startswith("sensor:"):
         raise ValueError(f"{name}: [observation] has no term '{kind}'; there are {', '.join([*TERMS, 'constant', 'sensor:NAME'])}" +
                          f"; an ini with `[policy] layout = {name}` and an [observation] of its own replaces it"
-                         * (pathlib.Path(str(name)).suffix in readers.SUFFIXES))
+                         * (pathlib.Path(str(name)).suffix.lower() in readers.SUFFIXES))
     try:
         values = numbers(text)
     except ValueError as error:
@@ -254,19 +263,19 @@ def _term(name, key, text):
     return Term(kind, np.array(values), len(values) if kind == "constant" else 0)
 
 
-def _matches(pattern, joints):
-    """For each joint whether a pattern matches its whole name, or is @ and its number."""
+def _matches(pattern, joints, numbers=None):
+    """For each joint whether a pattern matches its whole name, or is @ and its number; without numbers its place."""
     try:
-        return [re.fullmatch(pattern, joint) is not None or pattern == f"@{k}" for k, joint in enumerate(joints)]
+        return [re.fullmatch(pattern, joint) is not None or pattern == f"@{k}" for k, joint in zip(numbers or range(len(joints)), joints)]
     except re.error as error:
         raise ValueError(f"joints: '{pattern}' is no regular expression: {error}") from None
 
 
-def by_joint(rows, joints, otherwise, section):
+def by_joint(rows, joints, otherwise, section, numbers=None):
     """A number for each joint: that of the last pattern that matches its whole name."""
     values = np.full(len(joints), np.nan if otherwise is None else otherwise)
     for pattern, value in rows:
-        hit = _matches(pattern.pattern, joints)
+        hit = _matches(pattern.pattern, joints, numbers)
         if not any(hit):
             raise ValueError(f"[{section}] {pattern.pattern}: no joint has such a name; there are {', '.join(joints)}")
         values[hit] = value
@@ -275,13 +284,13 @@ def by_joint(rows, joints, otherwise, section):
     return values
 
 
-def choose(patterns, joints, key):
+def choose(patterns, joints, key, numbers=None):
     """Indices of joints in the order of the patterns that match their whole names; None: all."""
     if patterns is None:
         return list(range(len(joints)))
     order = []
     for pattern in patterns:
-        found = [i for i, hit in enumerate(_matches(pattern, joints)) if hit and i not in order]
+        found = [i for i, hit in enumerate(_matches(pattern, joints, numbers)) if hit and i not in order]
         if not found:
             raise ValueError(f"policy.{key}: no joint is left for '{pattern}'; there are {', '.join(joints)}")
         order += found

@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import re
+import reprlib
 
 SUFFIXES = (".onnx", ".yaml", ".yml")
 REMEDY = "describe the policy in an ini, with the keys of `mild trial --keys`"
@@ -31,11 +32,11 @@ def find(policy):
     beside = [folder / name for name in BESIDE for folder in folders if path.is_file() and (folder / name).is_file()]
     if beside and beside[0].name == BESIDE[0]:
         return beside[0]
-    if path.suffix == ".onnx" and path.is_file() and _kind(_metadata(path)[0]):
+    if path.suffix.lower() == ".onnx" and path.is_file() and _kind(_metadata(path)[0]):
         return path
     if beside:
         return beside[0]
-    if path.suffix in (".onnx", ".pt") and not path.is_file():
+    if path.suffix.lower() in (".onnx", ".pt") and not path.is_file():
         raise ValueError(f"policy: there is no file '{policy}'")
     raise ValueError(f"describe: '{path}' has no metadata of mjlab or holosoma, and no {' or '.join(BESIDE)} is beside it; needs --describe "
                      "with a config or an ini (docs/public-policies.md)")
@@ -44,7 +45,7 @@ def find(policy):
 def sections(path):
     """{section: {key: text}} of a file in one of SUFFIXES. Raises ValueError with file, key and remedy."""
     path = pathlib.Path(path)
-    if path.suffix == ".onnx":
+    if path.suffix.lower() == ".onnx":
         metadata, width = _metadata(path)
         read = {"joint_names": _mjlab, "dof_names": _holosoma}.get(_kind(metadata))
         if not read:
@@ -102,8 +103,16 @@ class Part:
             if isinstance(self.value, bool):
                 raise ValueError
             return float(self.value)
+        except OverflowError:
+            raise self.wrong("is too large") from None
         except (TypeError, ValueError):
-            raise self.wrong(f"must be a number, not {self.value!r}") from None
+            raise self.wrong(f"must be a number, not {reprlib.repr(self.value)}") from None
+
+    def positive(self):
+        value = self.number()
+        if not 0 < value < math.inf:
+            raise self.wrong(f"must be more than 0, not {value:g}")
+        return value
 
     def list(self, count=None):
         """Its values, of a list or of mjlab's text with commas; count: how many there must be."""
@@ -125,7 +134,7 @@ class Part:
     def integer(self):
         value = self.number()
         if not math.isfinite(value) or value != round(value):
-            raise self.wrong(f"must be a whole number, not {self.value!r}")
+            raise self.wrong(f"must be a whole number, not {reprlib.repr(self.value)}")
         return int(value)
 
     def json(self):
@@ -190,7 +199,7 @@ class Observation:
 
 # ---- Unitree's deploy.yaml ----
 def _deploy(document):
-    """Joints have numbers: the place of a motor among those of joint_ids_map is that of a joint in the model."""
+    """Joints have numbers: the place of a motor among those of joint_ids_map is that of a motor in the model (_stand.numbered)."""
     ids = document["joint_ids_map"].numbers()
     if len(set(ids)) < len(ids):
         raise document["joint_ids_map"].wrong("names a motor twice")
@@ -269,9 +278,14 @@ def _only(actions, kinds):
     if len(rows) != 1:
         raise actions.wrong(f"has {len(rows)} actions, and one can be read")
     name, action = rows[0]
-    kind = re.split(r"[:.]", str(action.get("class_type", name).value))[-1]
-    if kind not in kinds:
-        raise action.wrong(f"{kind} cannot be read, but {' and '.join(kinds)}")
+    return _of_kind(action, action.get("class_type", name), kinds)
+
+
+def _of_kind(action, kind, kinds):
+    """An action, if its kind is among those that can be read."""
+    last = re.split(r"[:.]", str(kind.value))[-1]
+    if last not in kinds:
+        raise action.wrong(f"{last[:80]} cannot be read, but {' and '.join(kinds)}")
     return action
 
 
@@ -287,7 +301,7 @@ def _target(action, default):
 
 # ---- Isaac Lab's env.yaml ----
 def _isaac(document):
-    """Joints are in the order of the simulator, breadth first."""
+    """Joints are in the order of the simulator, breadth first; where preserve_order is true, in that of the patterns that name them."""
     robot = document["scene"]["robot"]
     action = _only(document["actions"], ("JointPositionAction",))
     listed = action.get("preserve_order", False).value is True
@@ -300,7 +314,7 @@ def _isaac(document):
         implicit |= str(motor.get("class_type", "").value).endswith("ImplicitActuator")
         for table, keys in (("kp", ("stiffness",)), ("kd", ("damping",)), ("effort", ("effort_limit_sim", "effort_limit")), ("armature", ("armature",))):
             tables[table].update(_of_motor(motor, keys, table))
-    found = {"policy": {"joints": action["joint_names"].names(), "order": "listed" if listed else "breadth", "step": f"{document['sim']['dt'].number():g}",
+    found = {"policy": {"joints": action["joint_names"].names(), "order": _order(listed), "step": f"{document['sim']['dt'].positive():g}",
                         "decimation": document["decimation"].integer()},
              "action": {"seen": "raw", "target": "default" if whole else "zero"},
              "actuator": {"kind": "servo" if implicit else "torque"},
@@ -313,6 +327,10 @@ def _isaac(document):
     if group is None:
         raise document["observations"].wrong("has no group 'policy' or 'actor'")
     return _with(found, _isaac_observation(group))
+
+
+def _order(preserved):
+    return "grouped" if preserved else "breadth"
 
 
 def _isaac_observation(group):
@@ -330,14 +348,15 @@ def _isaac_observation(group):
         terms.add(function, scale.numbers() if isinstance(scale.value, list) else [scale.number()])
         frames.append((term, whole or term.get("history_length", 0).integer()))
         if function.startswith("joint_"):
-            joints = term.get("params", {}).get("asset_cfg", {}).get("joint_names", ".*").value
-            seen.append((term, joints if isinstance(joints, list) else [joints]))
+            of = term.get("params", {}).get("asset_cfg", {})
+            joints = of.get("joint_names", ".*").value
+            seen.append((term, (joints if isinstance(joints, list) else [joints], _order(of.get("preserve_order", False).value is True))))
         if function == "gait_phase":
             terms.clock = {"period": term["params"]["period"].number()}
     for term, joints in seen:
         if joints != seen[0][1]:
-            raise term.wrong("sees other joints than the first term of joints")
-    return {"policy": {"observed": seen[0][1]} if seen else {}, "observation": terms.keys, "clock": terms.clock,
+            raise term.wrong("sees other joints than the first term of joints, or in another order")
+    return {"policy": dict(zip(("observed", "observed_order"), seen[0][1])) if seen else {}, "observation": terms.keys, "clock": terms.clock,
             "history": {"frames": _one_length(frames), "stack": "term"}}
 
 
@@ -347,6 +366,7 @@ def _descriptors(document):
     if not isinstance(rows.value, list) or len(rows.value) != 1:
         raise rows.wrong("must be a list of one action")
     action = Part(rows.value[0], document.file, "actions[0]")
+    _of_kind(action, action["full_path"], ("JointPositionAction",))
     names, moved = robot["joint_names"].names(), action["joint_names"].names()
     scale, count = action.get("scale", 1.0), len(names)
     default = dict(zip(names, robot["default_joint_pos"].numbers(count)))
@@ -361,7 +381,7 @@ def _descriptors(document):
             seen.append((term, term["joint_names"].names()))
             if seen[-1][1] != seen[0][1]:
                 raise term.wrong("sees other joints than the first term of joints")
-    found = {"policy": {"joints": moved, "observed": seen[0][1] if seen else moved, "step": f"{document['scene']['physics_dt'].number():g}",
+    found = {"policy": {"joints": moved, "observed": seen[0][1] if seen else moved, "step": f"{document['scene']['physics_dt'].positive():g}",
                         "decimation": document["scene"]["decimation"].integer(), "integrator": "implicitfast"},
              "action": {"seen": "raw", "target": _target(action, [default.get(name, 0.0) for name in moved])}, "actuator": {"kind": "servo"},
              "observation": terms.keys, "history": {"frames": _one_length(frames), "stack": "term"}, "default": default,
@@ -431,7 +451,7 @@ def _holosoma(about, width):
         raise control["action_scales_by_effort_limit_over_p_gain"].wrong("must be false")
     gait = config["command"]["setup_terms"].get("locomotion_gait", {}).get("params", {})
     return _with(found, {
-        "policy": {"step": f"{1 / sim['fps'].number():g}", "decimation": sim["control_decimation"].integer()},
+        "policy": {"step": f"{1 / sim['fps'].positive():g}", "decimation": sim["control_decimation"].integer()},
         "default": {name: value.number() for name, value in robot["init_state"]["default_joint_angles"].items()},
         "scale": {".*": control["action_scale"].number() * action.get("scale", 1.0).number()}, "observation": terms.keys,
         "effort": dict(zip(joints, robot["dof_effort_limit_list"].numbers(len(joints)))),

@@ -194,6 +194,44 @@ class Yaml(Files):
         self.assertEqual(d.history["frames"], 2)  # that of the group goes before those of terms
         self.assertFalse(d.armature and d.armature[0][0].fullmatch("left_hip"))
 
+    def test_isaac_orders(self):
+        """preserve_order of the action and of the observation are two things; joints of one pattern go by depth."""
+        listed = ENV.replace("joint_names: [.*], scale", f"joint_names: [{', '.join(JOINTS)}], scale").replace("preserve_order: false", "preserve_order: true")
+        robot = self.robot(Description(self.write(listed, "env.yaml")))
+        self.assertEqual((robot.joints, robot.seen[0].tolist()), (JOINTS, [7, 9, 8, 10]))
+        seen = ENV.replace("asset_cfg: {joint_names: [.*]", "asset_cfg: {preserve_order: true, joint_names: [right.*, left_ankle, .*]")
+        robot = self.robot(Description(self.write(seen, "env.yaml")))
+        self.assertEqual((robot.joints, robot.seen[0].tolist()), (["left_hip", "right_hip", "left_ankle", "right_ankle"], [9, 10, 8, 7]))
+        robot = self.robot(Description(self.write(ENV.replace("preserve_order: false", "preserve_order: true"), "env.yaml")))
+        self.assertEqual(robot.joints, ["left_hip", "right_hip", "left_ankle", "right_ankle"])
+        other = ENV.replace("    actions: {func", "    speed: {func: a:joint_vel_rel, params: {asset_cfg: {joint_names: [.*], preserve_order: true}}}\n    actions: {func")
+        with self.assertRaisesRegex(ValueError, "speed: sees other joints than the first term of joints, or in another order"):
+            Description(self.write(other, "env.yaml"))
+
+    def test_motors(self):
+        """Numbers are those of the model's motors; where only some joints have one, in another order, both orders are printed."""
+        d = Description(self.write(DEPLOY))
+        motors = "".join(f'<motor joint="{name}"/>' for name in (*JOINTS[2:], *JOINTS[:2]))
+        for text, joints in ((motors, ["right_hip", "left_hip", "right_ankle", "left_ankle"]), ("", ["left_hip", "right_hip", "left_ankle", "right_ankle"])):
+            robot = _stand.stand(biped(motors="").replace("</actuator>", text + "</actuator>"), d, "rigid", {})
+            self.assertEqual((robot.joints, robot.default.tolist(), robot.kp.tolist()), (joints, [0.1, 0.2, 0.3, 0.4], [100, 80, 90, 70]))
+        some = biped(motors="").replace("</actuator>", '<motor joint="right_hip"/><motor joint="left_hip"/></actuator>')
+        with self.assertRaisesRegex(ValueError, "joints are left_hip, left_ankle, .*actuators those of right_hip, left_hip, so.*name the joints"):
+            _stand.stand(some, d, "rigid", {})
+        _stand.stand(some, Description({"observation": {"gravity": 1}, "kp": {".*": 1}}), "rigid", {})
+
+    def test_layout_of_itself(self):
+        for name, layout in (("mine.ini", "mine.ini"), ("mine.ini", "other.ini"), ("other.ini", "mine.ini")):
+            path = self.write(f"[policy]\nlayout = {layout}\n[observation]\ngravity = 1\n", name)
+        with self.assertRaisesRegex(ValueError, r"\w+.ini: policy.layout leads back"):
+            Description(path)
+        path.write_bytes(b"\xff\xfe\x00")
+        with self.assertRaisesRegex(ValueError, "other.ini: is no text"):
+            Description(path)
+        with self.assertRaisesRegex(ValueError, "policy.step must be 0 or more"):
+            Description({"observation": {"gravity": 1}}, {"policy.step": "nan"})
+        self.assertEqual(Description(self.write(DEPLOY, "DEPLOY.YAML")).policy["model_joints"], 4)
+
     def test_isaac_gains(self):
         """Gains of the simulator's own file are asked for, and an ini gives them."""
         path = self.write(ENV.replace("stiffness: 20.0", "stiffness: null"), "env.yaml")
@@ -236,12 +274,15 @@ class Yaml(Files):
             (["observations"], {"a": {"b": {"params": {}}}, "c": {"d": {"params": {}}}}, "2 groups"))]
         faults += [(change(IO, path, value), line) for path, value, line in (
             (["actions"], [], "list of one action"), (["observations", "policy", 0, "full_path"], ..., r"policy\[0\].full_path: is missing"),
-            (["articulations", "robot", "default_joint_pos"], [1], "has 1 values"), (["scene"], ..., "scene: is missing"))]
+            (["articulations", "robot", "default_joint_pos"], [1], "has 1 values"), (["scene"], ..., "scene: is missing"),
+            (["actions", 0, "full_path"], "a.b.JointVelocityAction", r"actions\[0\]: JointVelocityAction cannot be read"),
+            (["scene", "physics_dt"], -1, "physics_dt: must be more than 0, not -1"), (["scene", "decimation"], 10**400, "decimation: is too large"),
+            (["scene", "decimation"], "x" * 9999, "decimation: must be a number, not '.{,40}'; describe"))]
         faults += [(ENV.replace(*pair), line) for pair, line in (
             (("concatenate_terms: true", "concatenate_terms: false"), "concatenate_terms: must be true"), (("  policy:", "  other:"), "no group"),
             (("decimation: 5", "decimation: many"), "decimation: must be a number"), (("modifiers: null", "modifiers: [1]"), "modifiers: cannot be read"),
             (("use_default_offset: true", "use_default_offset: false, offset: 1"), "offset: must be 0"), (("init_state", "state"), "init_state: is missing"),
-            (("[-100, 100]", "[-1, 1]"), "clip: limits"))]
+            (("[-100, 100]", "[-1, 1]"), "clip: limits"), (("dt: 0.004", "dt: .nan"), "sim.dt: must be more than 0, not nan"))]
         for document, line in faults:
             path = self.write(document)
             with self.subTest(line), self.assertRaisesRegex(ValueError, line) as caught:
@@ -259,7 +300,7 @@ class Yaml(Files):
         count = 0
         for read, document, more in readings:
             for path in paths(document):
-                for value in (..., None, True, -1.5, "x", "nan", [], {}, [1], {"a": {"b": None}}, ["("]):
+                for value in (..., None, True, 0, -1.5, 10**400, "x", "nan", [], {}, [1], {"a": {"b": None}}, ["("]):
                     changed = change(document, path, value)
                     try:
                         Description(readers._texts(read(readers.Part(changed, "f"), *more)))
@@ -354,7 +395,9 @@ class Onnx(Files):
                                ({**MJLAB, "action_scale": "1,2"}, "action_scale: has 2 values.*which it moves"),
                                ({**MJLAB, "observation_names": "base_ang_vel,radar"}, "no term 'radar'.*layout = .*policy.onnx"),
                                ({"joint_names": "a"}, "action_scale: is missing"), ({"dof_names": "not json"}, "dof_names: is no JSON"),
-                               ({"dof_names": "[\"a\"]", "kp": "[1]", "kd": "[1]", "experiment_config": "{}"}, "robot: is missing")):
+                               ({"dof_names": "[\"a\"]", "kp": "[1]", "kd": "[1]", "experiment_config": "{}"}, "robot: is missing"),
+                               ({"dof_names": json.dumps(JOINTS), "kp": "[1, 2, 3, 4]", "kd": "[1, 2, 3, 4]", "experiment_config": json.dumps(change(
+                                   HOLOSOMA, ["simulator", "config", "sim", "fps"], 0))}, "fps: must be more than 0, not 0")):
             path = self.onnx(metadata)
             with self.subTest(line), self.assertRaisesRegex(ValueError, line) as caught:
                 Description(path)
