@@ -5,7 +5,8 @@
     scripts/public_policies.py CLONES --out out/public # CLONES/REPOSITORY for each; a table and a JSON for each policy
     scripts/public_policies.py CLONES --out out/public --sweep stiffness,friction # S50 of each
 
-Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again; a sweep goes on from it."""
+Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again; a sweep goes on from it. One that
+fails is left out, and the exit status is 1; a CSV keeps the rows of what was not run."""
 import argparse
 import csv
 import json
@@ -111,8 +112,33 @@ def run(clones, out, name, options, sweep=None):
         describe = ROOT / f"examples/trial/{name}.ini"
         subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, *(["--describe", str(describe)] if describe.is_file() else []),
                         "--json", str(target), *(["--sweep", sweep] if sweep else []), *options,
-                        *(own[0].format(clones=clones).split() if own else [])], check=True)
+                        *(word.format(clones=clones) for words in own for word in words.split())], check=True)
     return json.loads(target.read_text())
+
+
+def attempt(failed, *arguments):
+    """The JSON of one policy, or None, its name among those that failed."""
+    try:
+        return run(*arguments)
+    except (subprocess.CalledProcessError, OSError, ValueError) as error:
+        print(f"public_policies: {arguments[2]}: {error}", file=sys.stderr)
+        failed.append(arguments[2])
+        return None
+
+
+def merge(path, header, rows):
+    """Writes a CSV whose rows are named by their first two cells: these, and those of the file that are not among them."""
+    before = []
+    if path.is_file():
+        with open(path, encoding="utf-8", newline="") as file:
+            first, *before = [row for row in csv.reader(file) if row] or [header]
+        if first != header:
+            sys.exit(f"public_policies: {path} has other columns; name another file or remove it")
+    whole = {tuple(row[:2]): row for row in [*before, *rows]}
+    part = path.with_name(path.name + ".part")
+    with open(part, "w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *whole.values()])
+    part.replace(path)
 
 
 def cell(row):
@@ -129,14 +155,13 @@ def write_csv(path, tables):
         values = [walk[key] for walk in row["each"] if walk[key] is not None and (walk["end"] == "time" or not upright)]
         return f"{sum(values) / len(values):.3f}" if values else ""
 
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["policy", "ground", "trials", "upright", "speed [m/s]", "cost", "largest torque [N m]", "sinkage [m]", "median fall [s]"])
-        for name, table in tables.items():
-            for row in table["rows"]:
-                times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
-                writer.writerow([name, row["ground"], row["trials"], row["upright"], mean(row, "speed", True), mean(row, "cost", True),
-                                 f"{row['torque']:.1f}", mean(row, "sinkage", False), f"{times[len(times) // 2]:.2f}" if times else ""])
+    rows = []
+    for name, table in tables.items():
+        for row in table["rows"]:
+            times = sorted(walk["time"] for walk in row["each"] if walk["end"] != "time")
+            rows.append([name, row["ground"], row["trials"], row["upright"], mean(row, "speed", True), mean(row, "cost", True),
+                         f"{row['torque']:.1f}", mean(row, "sinkage", False), f"{times[len(times) // 2]:.2f}" if times else ""])
+    merge(path, ["policy", "ground", "trials", "upright", "speed [m/s]", "cost", "largest torque [N m]", "sinkage [m]", "median fall [s]"], rows)
 
 
 def s50(found):
@@ -144,25 +169,24 @@ def s50(found):
     first, last = (f"{value:.3g}" for value in found["range"])
     low, high = ("" if value is None else f"{value:.3g}" for value in found["interval"])
     if found["verdict"] in ("never_falls", "always_falls"):
-        return f"< {high}" if high else f"> {low}" if low else found["verdict"].replace("_", " ")
+        return f"< {high}" if high else f"> {low}" if low else f"not from {first} to {last}"
     middle = "-" if found["s50"] is None else f"{found['s50']:.3g}"
     return f"{middle} ({low or 'below ' + first} to {high or 'above ' + last})"
 
 
 def run_sweeps(clones, arguments, options):
     """A table of S50, and its CSV."""
-    sweeps, rows = arguments.sweep.split(","), []
+    sweeps, rows, failed = arguments.sweep.split(","), [], []
     print("| policy | " + " | ".join(sweeps) + " |", "|---" * (len(sweeps) + 1) + "|", sep="\n")
     for name in arguments.only.split(","):
-        found = [run(clones, arguments.out, name, options, sweep) for sweep in sweeps]
+        found = [attempt(failed, clones, arguments.out, name, options, sweep) for sweep in sweeps]
         rows += [[name, one["sweep"], one["unit"], one["verdict"], one["s50"], *one["interval"], one["trials"],
-                  sum(walk["end"] == "time" for walk in one["each"])] for one in found]
-        print(f"| {name} | " + " | ".join(map(s50, found)) + " |", flush=True)
+                  sum(walk["end"] == "time" for walk in one["each"])] for one in found if one]
+        print(f"| {name} | " + " | ".join(s50(one) if one else "failed" for one in found) + " |", flush=True)
     if arguments.csv:
-        with open(arguments.csv, "w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["policy", "sweep", "unit", "verdict", "S50", "low", "high", "trials", "upright"])
-            writer.writerows([[f"{value:.4g}" if isinstance(value, float) else value for value in row] for row in rows])
+        merge(arguments.csv, ["policy", "sweep", "unit", "verdict", "S50", "low", "high", "trials", "upright"],
+              [[f"{value:.4g}" if isinstance(value, float) else value for value in row] for row in rows])
+    return bool(failed)
 
 
 def main():
@@ -177,12 +201,18 @@ def main():
     arguments = parser.parse_args()
     if arguments.list or not arguments.clones:
         show()
-        return
+        return 0
+    names = arguments.only.split(",")
+    unknown = [name for name in names if name not in POLICIES]
+    if unknown:
+        sys.exit(f"public_policies: --only: no policy is named {', '.join(unknown)}; there are {', '.join(POLICIES)}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     options = (arguments.options or f"--seconds 20 --speed 0.5{'' if arguments.sweep else ' --trials 10'}").split()
     if arguments.sweep:
         return run_sweeps(arguments.clones, arguments, options)
-    tables = {name: run(arguments.clones, arguments.out, name, options) for name in arguments.only.split(",")}
+    failed = []
+    found = {name: attempt(failed, arguments.clones, arguments.out, name, options) for name in names}
+    tables = {name: table for name, table in found.items() if table}
     if arguments.csv:
         write_csv(arguments.csv, tables)
     lines = []
@@ -192,7 +222,8 @@ def main():
             lines = ["| policy | " + " | ".join(row["ground"] for row in rows) + " |", "|---" * (len(rows) + 1) + "|"]
         lines.append(f"| {name}: {POLICIES[name][0]} | " + " | ".join(map(cell, rows)) + " |")
     print("\n".join(lines))
+    return bool(failed)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

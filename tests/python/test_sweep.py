@@ -1,5 +1,7 @@
 """mild trial --sweep: the estimator on known curves, the ground that it makes, files that it goes on from, and the command."""
+import contextlib
 import copy
+import io
 import json
 import os
 import pathlib
@@ -246,6 +248,52 @@ class Files(unittest.TestCase):
         for result in (first, second):
             _, _, (low, high) = result.curve.result()
             self.assertTrue(low <= 3 <= high and high / low <= sweep.WITHIN)
+
+
+class Script(unittest.TestCase):
+    """scripts/public_policies.py, whose trials are made here."""
+
+    def trial(self, arguments, check):
+        """In the place of `mild trial`: one policy fails."""
+        self.words = arguments
+        name, file = pathlib.Path(arguments[arguments.index("--json") + 1]).stem, pathlib.Path(arguments[arguments.index("--json") + 1])
+        if name.startswith("unitree_h1"):
+            raise subprocess.CalledProcessError(2, "mild trial")
+        walk = {"end": "tilt", "time": 2.0, "speed": None, "cost": None, "sinkage": 0.01}
+        found = {"rows": [{"ground": "rigid", "trials": 1, "upright": 0, "torque": 1.0, "each": [walk]}]}
+        if "--sweep" in arguments:
+            found = {"sweep": "slip", "unit": "mm", "verdict": "inside", "s50": 3.0, "interval": [2.9, 3.1], "trials": 1, "range": [0.1, 100], "each": [walk]}
+        file.write_text(json.dumps(found))
+
+    def run_main(self, *arguments):
+        sys.path.insert(0, str(ROOT / "scripts"))
+        import public_policies
+
+        with unittest.mock.patch.object(sys, "argv", ["public_policies", *map(str, arguments)]), contextlib.redirect_stdout(io.StringIO()) as out, \
+                contextlib.redirect_stderr(io.StringIO()), unittest.mock.patch.object(public_policies.subprocess, "run", self.trial):
+            try:
+                return public_policies.main(), out.getvalue()
+            except SystemExit as error:
+                return error.code, out.getvalue()
+
+    def test_failed(self):
+        """One that fails loses nothing of the rest; rows that were not run stay; a folder's name may have blanks."""
+        with tempfile.TemporaryDirectory(prefix="with blank ") as folder:
+            out, table = pathlib.Path(folder), pathlib.Path(folder) / "rows.csv"
+            header = "policy,ground,trials,upright,speed [m/s],cost,largest torque [N m],sinkage [m],median fall [s]"
+            table.write_text(header + "\nmild_go1,rigid,10,10,,,,,\nunitree_g1,rigid,9,9,,,,,\nunitree_h1,rigid,8,8,,,,,\n")
+            status, text = self.run_main(out, "--out", out, "--only", "unitree_h1,unitree_g1,h1_2_sim2sim", "--csv", table)
+            self.assertEqual((status, "| unitree_g1:" in text, "unitree_h1:" in text), (1, True, False))
+            self.assertTrue(self.words[-1].startswith(folder + "/"), self.words)
+            self.assertEqual([row.split(",")[:3] for row in table.read_text().splitlines()[1:]],
+                             [["mild_go1", "rigid", "10"], ["unitree_g1", "rigid", "1"], ["unitree_h1", "rigid", "8"], ["h1_2_sim2sim", "rigid", "1"]])
+            table = out / "s50.csv"
+            table.write_text("policy,sweep,unit,verdict,S50,low,high,trials,upright\nunitree_g1,stiffness,MPa/m,inside,2.6,2.3,2.8,44,21\n")
+            status, text = self.run_main(out, "--out", out, "--only", "unitree_h1,unitree_g1", "--sweep", "slip", "--csv", table)
+            self.assertEqual((status, "| unitree_h1 | failed |" in text, "3 (2.9 to 3.1)" in text), (1, True, True))
+            self.assertEqual([row.split(",")[:2] for row in table.read_text().splitlines()[1:]], [["unitree_g1", "stiffness"], ["unitree_g1", "slip"]])
+            status, _ = self.run_main(out, "--only", "nobody")
+            self.assertRegex(status, "^public_policies: --only: no policy is named nobody; there are")
 
 
 class Commands(unittest.TestCase):
