@@ -240,6 +240,8 @@ def _of_model(model):
     if str(model).lstrip().startswith("<"):
         return _sha256(str(model).encode())
     files = [pathlib.Path(model)]
+    if not files[0].is_file():
+        raise ValueError(f"model: there is no file '{model}'")
     for file in files:
         names = re.findall(rb"<include\s[^>]*?file\s*=\s*[\"']([^\"']+)", file.read_bytes())
         files += [one for one in (files[0].parent / os.fsdecode(name) for name in names) if one.is_file() and one not in files]
@@ -248,9 +250,12 @@ def _of_model(model):
 
 def _of_policy(policy):
     """sha256 of a policy's file and of its weights beside it, or of the file that has its code."""
-    place, _, name = str(policy).rpartition(":")
-    origin = importlib.util.find_spec(place).origin if name and re.fullmatch(r"[\w.]+", place) and not place.endswith(".py") else place or policy
-    files = [pathlib.Path(one) for one in (policy, f"{policy}.data", origin)]
+    place = str(policy).rpartition(":")[0]
+    try:
+        module = importlib.util.find_spec(place) if place and not place.endswith(".py") else None
+    except (ImportError, ValueError):
+        module = None
+    files = [pathlib.Path(one) for one in (policy, f"{policy}.data", getattr(module, "origin", None) or place)]
     found = [file.read_bytes() for file in files if file.is_file()]
     if not found:
         raise ValueError(f"policy: there is no file '{policy}'")
@@ -289,11 +294,11 @@ def sweep(model, policy, describe, quantity, *, ground=None, limits=None, comman
           changes=None, attributes=None, jobs=1, file=None, report=None):
     """Finds the value of a quantity at which half of the trials stay up. Returns a Sweep.
 
-    model, policy, describe: files, as in mild.trial. quantity: stiffness, friction, slip, damping. ground: the preset that has all
-    numbers but those of the sweep; None: QUANTITIES names it. limits: (low, high) [unit of the quantity]. most: number of trials at most. file: JSON, whole after
-    every trial; a sweep that finds its own file goes on from there, and refuses
-    that of another robot, policy, description or MuJoCo, by their sha256. report: called with the Sweep after every trial. The result does
-    not depend on jobs, nor on interruptions. Other arguments, errors: mild.trial."""
+    model, policy, describe: files, as in mild.trial. quantity: stiffness, friction, slip, damping. ground: the preset that has all numbers
+    but those of the sweep; None: QUANTITIES names it. limits: (low, high) [unit of the quantity]. most: number of trials at most. file:
+    JSON, whole after every trial; a sweep that finds its own file goes on from there, and refuses that of another robot, policy,
+    description or MuJoCo, by their sha256. report: called with the Sweep after every trial. The result does not depend on jobs, nor on
+    interruptions. Other arguments, errors: mild.trial."""
     if quantity not in QUANTITIES:
         raise ValueError(f"sweep: '{quantity}' is none of {', '.join(QUANTITIES)}")
     q = QUANTITIES[quantity]
@@ -376,7 +381,8 @@ def run(arguments, changes, attributes):
 
     result = sweep(arguments.model, arguments.policy, arguments.describe, arguments.sweep, ground=grounds[0], limits=arguments.range,
                    command=(arguments.speed[0], arguments.sideways, arguments.turn), most=most,
-                   seconds=arguments.seconds, seed=arguments.seed, noise=arguments.noise, changes=changes, attributes=attributes, jobs=arguments.jobs, file=whole, report=report)
+                   seconds=arguments.seconds, seed=arguments.seed, noise=arguments.noise, changes=changes, attributes=attributes, jobs=arguments.jobs,
+                   file=whole, report=report)
     print(result, file=sys.stderr if arguments.json == "-" else sys.stdout)
     if arguments.json == "-":
         json.dump(result.as_dict(), sys.stdout, indent=2)

@@ -204,7 +204,8 @@ class Yaml(Files):
         self.assertEqual((robot.joints, robot.seen[0].tolist()), (["left_hip", "right_hip", "left_ankle", "right_ankle"], [9, 10, 8, 7]))
         robot = self.robot(Description(self.write(ENV.replace("preserve_order: false", "preserve_order: true"), "env.yaml")))
         self.assertEqual(robot.joints, ["left_hip", "right_hip", "left_ankle", "right_ankle"])
-        other = ENV.replace("    actions: {func", "    speed: {func: a:joint_vel_rel, params: {asset_cfg: {joint_names: [.*], preserve_order: true}}}\n    actions: {func")
+        term = "    speed: {func: a:joint_vel_rel, params: {asset_cfg: {joint_names: [.*], preserve_order: true}}}\n"
+        other = ENV.replace("    actions: {func", term + "    actions: {func")
         with self.assertRaisesRegex(ValueError, "speed: sees other joints than the first term of joints, or in another order"):
             Description(self.write(other, "env.yaml"))
 

@@ -217,6 +217,11 @@ class Files(unittest.TestCase):
         file.write_text(file.read_text().replace('"value": 1000.0', '"value": 1000.0000000001'))
         again = self.run_sweep(file, most=8)
         self.assertEqual(sum(row[1] for row in again.points()), 8)
+        for files, line in (((self.folder / "no.xml", *self.files[1:]), "model: there is no file"),
+                            ((self.files[0], "nobody:x", self.files[2]), "policy: there is no file"), ((self.files[0], self.folder / "no.pt", self.files[2]), "policy: there is no file")):
+            with self.assertRaisesRegex(ValueError, line):
+                sweep.sweep(*files, "stiffness")
+        self.assertEqual(sweep._of_policy("mild.sweep:x"), sweep._of_policy(f"{sweep.__file__}:x"))
         with unittest.mock.patch("mujoco.mj_versionString", lambda: "1.2.3"), self.assertRaisesRegex(ValueError, "mujoco .* instead of 1.2.3"):
             self.run_sweep(file, most=8)
 
