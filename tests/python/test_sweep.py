@@ -332,6 +332,9 @@ class Commands(unittest.TestCase):
             else:
                 self.run_main(*sweeping, "stiffness", "--seconds", "0.2", "--json", folder / "1.json", "--plot", folder / "curve.png")
                 self.assertGreater((folder / "curve.png").stat().st_size, 10000)
+            with unittest.mock.patch.dict(sys.modules, {"matplotlib.figure": None}), unittest.mock.patch.object(sweep, "sweep") as walks:
+                status, _, error = self.run_main(*sweeping, "stiffness", "--plot", folder / "curve.png")
+            self.assertEqual((status, "needs matplotlib" in error, walks.called), (2, True, False))
             for more, line in ((("wind",), "'wind' is none of stiffness, friction"), (("slip", "--range", "3,1"), "0 < low < high"),
                                (("slip", "--range", "3"), "--range LOW,HIGH"), (("friction", "--range", "0.1,9"), "mu"), (("friction", "--trials", 0), "more than 0"),
                                (("friction", "--ground", "rigid"), "one soft ground"), (("friction", "--speed", "0,1"), "one speed"),
