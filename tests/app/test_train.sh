@@ -40,7 +40,7 @@ rm begin.safetensors
 good "$mild" train --out begun --resume --train.iterations=2
 # nor with one that sees as many points elsewhere
 good "$mild" train --out sees "${tiny[@]}" --task.scan=3 --task.scan_ahead="0 0.3" --train.iterations=1
-bad "train.start scan_ahead" "$mild" train --out other "${tiny[@]}" --task.scan=4 --task.scan_ahead="0 0.2" --train.start=sees/policy.safetensors
+bad "train.start scan_ahead" "$mild" train --out other "${tiny[@]}" --task.scan=3 --task.scan_ahead="0.1 0.4" --train.start=sees/policy.safetensors
 good "$mild" eval --policy full/checkpoint_000000002.safetensors --ground rigid --trials 1 --seconds 0.1
 same_numbers whole/$last full/$last
 

@@ -35,13 +35,13 @@ void train_destroy(Trainer *trainer) {
 }
 
 /* The networks of a policy file take the place of the random ones. */
-/* Bool: the points of the ground that `other` sees, if it does, are those of `own`. */
+/* Bool: the points of the ground that `other` sees, if it does, are those of `own`, whose scan has
+ * as many. */
 static int sees_the_same(const TaskDef *own, const PolicyDef *other) {
     TaskDef theirs = *own;
     return other->scan == 0 || (task_policy_keys_read(&theirs, other->task, NULL) == MILD_OK &&
                                 theirs.scan == own->scan && theirs.scan_pitch == own->scan_pitch &&
-                                theirs.scan_ahead[0] == own->scan_ahead[0] &&
-                                theirs.scan_ahead[1] == own->scan_ahead[1]);
+                                theirs.scan_ahead[0] == own->scan_ahead[0]);
 }
 
 static MildStatus start_policy(Trainer *trainer, MildError *error) {
