@@ -38,9 +38,10 @@ cp full/policy.safetensors begin.safetensors
 good "$mild" train --out begun "${tiny[@]}" --train.start=begin.safetensors --train.iterations=1
 rm begin.safetensors
 good "$mild" train --out begun --resume --train.iterations=2
-# nor with one that sees as many points elsewhere
+# a policy that sees as many points elsewhere is no start
 good "$mild" train --out sees "${tiny[@]}" --task.scan=3 --task.scan_ahead="0 0.3" --train.iterations=1
-bad "train.start scan_ahead" "$mild" train --out other "${tiny[@]}" --task.scan=3 --task.scan_ahead="0.1 0.4" --train.start=sees/policy.safetensors
+bad "train.start scan_ahead" "$mild" train --out other "${tiny[@]}" --train.iterations=1 --task.scan=3 --task.scan_ahead="0.1 0.4" \
+    --train.start=sees/policy.safetensors
 good "$mild" eval --policy full/checkpoint_000000002.safetensors --ground rigid --trials 1 --seconds 0.1
 same_numbers whole/$last full/$last
 
