@@ -81,6 +81,13 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     if (task_def_check_plain(def->task, "drive", error) != MILD_OK) {
         return NULL;
     }
+    if (robot_actions(def->robot) < robot_joints(def->robot)) {
+        mild_fail(error, MILD_ERROR_ARGUMENT,
+                  "drive: robot %s has joints that another program moves (driven in robot.ini), "
+                  "and a packet's targets are of all joints",
+                  robot_name(def->robot));
+        return NULL;
+    }
     Runner *r = calloc(1, sizeof *r);
     if (!r) {
         mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
@@ -381,7 +388,7 @@ static void step_policy(Runner *r, const TaskSensors *reading, const double comm
         runner_damp(r, "the policy's action is not finite");
         return;
     }
-    task_begin_step(r->env, &r->task, r->action);
+    task_begin_step(r->env, &r->task, robot_table(r->def.robot), r->action);
     set_targets(r, reading);
     set_command(r, command);
     speed_hold(&r->hold, &r->speed_hold, task_env_frame(r->env),

@@ -175,7 +175,7 @@ static int open_arrays(Others *others) {
     others->other = calloc(count, sizeof *others->other);
     others->env = calloc(count, sizeof *others->env);
     others->action =
-        calloc(count * (size_t)robot_joints(others->def.robot), sizeof *others->action);
+        calloc(count * (size_t)robot_actions(others->def.robot), sizeof *others->action);
     others->reward = calloc(count, sizeof *others->reward);
     others->flag = calloc(count, 3);
     others->fallen = calloc(count, 1);

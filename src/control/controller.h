@@ -10,7 +10,7 @@
 typedef struct {
     void *self;
     const char *name;
-    /* Writes actions [rows][robot_joints] for the present state of the environments. One caller at
+    /* Writes actions [rows][robot_actions] for the present state of the environments. One caller at
      * a time. */
     void (*act)(void *self, int rows, TaskEnv *const *envs, float *actions);
     void (*destroy)(void *self);

@@ -92,20 +92,20 @@ void controller_destroy(Controller *controller) {
 /* ---- takes no action. The joints hold the default pose with the task's gains ---- */
 
 static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
-    const int *joints = self;
+    const int *width = self;
     (void)envs;
-    for (int i = 0; i < rows * *joints; i++) {
+    for (int i = 0; i < rows * *width; i++) {
         actions[i] = 0;
     }
 }
 
 MildStatus controller_make_zero(const ControllerDef *def, Controller *controller,
                                 MildError *error) {
-    int *joints = malloc(sizeof *joints);
-    if (!joints) {
+    int *width = malloc(sizeof *width);
+    if (!width) {
         return mild_fail(error, MILD_ERROR_MEMORY, "zero: out of memory");
     }
-    *joints = robot_joints(def->robot);
-    *controller = (Controller){.self = joints, .name = "zero", .act = zero_act, .destroy = free};
+    *width = robot_actions(def->robot);
+    *controller = (Controller){.self = width, .name = "zero", .act = zero_act, .destroy = free};
     return MILD_OK;
 }

@@ -302,8 +302,8 @@ typedef struct {
 /* Gains are part of a motor command, so the environments get the gains of the stand. */
 static void standing_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Standing *standing = self;
-    int joints = robot_joints(standing->robot);
-    size_t bytes = (size_t)joints * sizeof(double);
+    const int width = robot_actions(standing->robot);
+    const size_t bytes = (size_t)robot_joints(standing->robot) * sizeof(double);
     const double *pose = robot_default_pose(standing->robot);
     for (int e = 0; e < rows; e++) {
         double target[ROBOT_JOINTS_MAX];
@@ -311,8 +311,8 @@ static void standing_act(void *self, int rows, TaskEnv *const *envs, float *acti
         memcpy(task_env_rest(envs[e])->gains.kd, robot_stand_kd(standing->robot), bytes);
         task_env_load(envs[e], standing->sim);
         stand_target(standing->stand, standing->sim, target);
-        for (int i = 0; i < joints; i++) {
-            actions[e * joints + i] = (float)((target[i] - pose[i]) / standing->action_scale);
+        for (int i = 0; i < width; i++) {
+            actions[e * width + i] = (float)((target[i] - pose[i]) / standing->action_scale);
         }
     }
 }

@@ -261,7 +261,8 @@ WARP_FN void env_measure(const EnvsArrays *all, long robot, int contact, EnvWork
 WARP_FN void env_act(const EnvsArrays *all, const EnvsStep *call, long robot, TaskEnv *env) {
     EACH_LANE(l) {
         if (LANE(l) < TILE) {
-            task_begin_step(env, &all->task->task, call->action + robot * env->shape.actions);
+            task_begin_step(env, &all->task->task, &all->task->robot,
+                            call->action + robot * env->shape.actions);
         }
         if (LANE(l) == 0) {
             env_robot_at(all, robot)->diverged = 0;

@@ -28,6 +28,7 @@ typedef struct {
     char full_speed[LIST_SIZE];
     char swing[LIST_SIZE];
     char still[LIST_SIZE];
+    char driven[LIST_SIZE];
 } JointsText;
 
 typedef struct {
@@ -87,6 +88,7 @@ static const MildField joint_fields[] = {
     J(full_speed, "[rad/s] up to which it gives its whole torque; 0, the default: up to speed"),
     J(swing, "[-] amplitude in the reference swing motion, times reward.reference_amplitude"),
     J(still, "[-] 1 for joints that reward.default_pose keeps near the pose; default 0"),
+    J(driven, "[-] 1 for joints that another program moves, not the policy; the last; default 0"),
 };
 
 #define F(key, type, count, min, max, help)                                                        \
@@ -404,10 +406,30 @@ static MildStatus check_joint_names(DefReader *reader) {
     return MILD_OK;
 }
 
+/* Counts the driven joints. They are the last, so that joint i is that of action i. */
+static MildStatus take_driven(DefReader *reader, const double *driven) {
+    RobotDef *def = reader->def;
+    const int joints = def->joints;
+    while (def->driven < joints && driven[joints - 1 - def->driven] == 1.0) {
+        def->driven++;
+    }
+    for (int i = 0; i < joints; i++) {
+        const int other = find_joint(def, def->mirror[i]);
+        if (driven[i] != (i >= joints - def->driven) || driven[i] != driven[other]) {
+            return fail_key(reader, "joints", "driven",
+                            "must be 0 or 1, the same for mirrored joints, with those of 1 last");
+        }
+    }
+    return def->driven < joints
+               ? MILD_OK
+               : fail_key(reader, "joints", "driven", "no joint is left to the policy");
+}
+
 static MildStatus take_joints(DefReader *reader) {
     RobotDef *def = reader->def;
     const JointsText *text = &reader->joints;
     static const double zeros[ROBOT_JOINTS_MAX];
+    double driven[ROBOT_JOINTS_MAX];
     def->joints = take_names(reader, "joints", "names", text->names, def->joint, ROBOT_JOINTS_MAX);
     if (def->joints < 1) {
         return def->joints < 0 ? reader->status
@@ -434,7 +456,8 @@ static MildStatus take_joints(DefReader *reader) {
                    {"speed", text->speed, def->speed, zeros, 0},
                    {"full_speed", text->full_speed, def->full_speed, zeros, 0},
                    {"swing", text->swing, def->swing, zeros, -1e6},
-                   {"still", text->still, def->still, zeros, 0}};
+                   {"still", text->still, def->still, zeros, 0},
+                   {"driven", text->driven, driven, zeros, 0}};
     for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) {
         if (take_column(reader, columns[i].key, columns[i].text, columns[i].column,
                         columns[i].fallback, columns[i].least) != MILD_OK) {
@@ -446,7 +469,8 @@ static MildStatus take_joints(DefReader *reader) {
             return fail_key(reader, "joints", "full_speed", "is above speed");
         }
     }
-    return check_joint_names(reader);
+    const MildStatus status = check_joint_names(reader);
+    return status == MILD_OK ? take_driven(reader, driven) : status;
 }
 
 /* ---- feet ---- */

@@ -76,6 +76,7 @@ typedef struct {
     double full_speed[ROBOT_JOINTS_MAX];  /* [rad/s] see RobotTable */
     double swing[ROBOT_JOINTS_MAX];       /* [-] amplitude in the reference swing motion */
     double still[ROBOT_JOINTS_MAX];       /* [-] 1: should stay near the pose, 0: may move */
+    int driven; /* joints that another program moves, not the policy: the last of the joints */
     /* sections [foot.NAME] */
     int feet;
     double mirror_shift; /* [-] 0 or 0.5 gait cycles between a gait and its mirror image */

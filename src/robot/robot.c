@@ -381,6 +381,7 @@ static void fill_table(Robot *robot) {
     const RobotDef *def = &robot->def;
     RobotTable *table = &robot->table;
     table->joints = def->joints;
+    table->actions = def->joints - def->driven;
     table->feet = def->feet;
     for (int i = 0; i < def->joints; i++) {
         table->joint_foot[i] = robot->joint_foot[i];
@@ -464,6 +465,10 @@ const char *robot_model_path(const Robot *robot) {
 
 int robot_joints(const Robot *robot) {
     return robot->def.joints;
+}
+
+int robot_actions(const Robot *robot) {
+    return robot->def.joints - robot->def.driven;
 }
 
 int robot_feet(const Robot *robot) {

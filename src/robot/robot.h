@@ -76,6 +76,9 @@ const char *robot_name(const Robot *robot);
 const char *robot_source(const Robot *robot);     /* whose numbers, which licence */
 const char *robot_model_path(const Robot *robot); /* MJCF */
 int robot_joints(const Robot *robot);
+/* Joints that a policy acts on: the first of them. The others are driven: another program, or
+ * env/task/driven.h in its place, moves them. */
+int robot_actions(const Robot *robot);
 int robot_feet(const Robot *robot);
 int robot_points(const Robot *robot); /* bool: no foot transmits a moment to soft ground */
 const char *robot_joint_name(const Robot *robot, int joint);

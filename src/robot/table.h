@@ -7,6 +7,7 @@
 
 typedef struct {
     int joints;
+    int actions; /* joints that a policy acts on, the first; the others are driven */
     int feet;
     int shells_stand; /* bool: robot_bodies counts those with shells */
     int joint_foot[ROBOT_JOINTS_MAX];

@@ -355,7 +355,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                        const TaskCallback *callback) {
     TaskSensors sensors = {0};
     RobotReading reading = {.above = 0};
-    task_begin_step(env, def, action);
+    task_begin_step(env, def, robot_table(robot), action);
     lend_map(env, def);
     robot_sim_set_solver(sim, (MildSolver)def->solver, def->contact_tolerance,
                          def->contact_iterations);

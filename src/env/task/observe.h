@@ -2,11 +2,11 @@
  *   0..2   base angular velocity, base frame [rad/s]
  *   3..5   command (vx, vy, wz) times (2, 2, 1)
  *   6..8   unit gravity in the base frame
- *   then for each of n joints, in the order of robot.ini,
- *   9..         q - q_default [rad]
- *   9 + n..     qd times 0.05
- *   9 + 2 n..   last action
- *   9 + 3 n..   those of TASK_FRAME_LIST (state.h) that the task has, the clock last */
+ *   then for each of n joints, in the order of robot.ini, of which a policy acts on the first m,
+ *   9..           q - q_default [rad]
+ *   9 + n..       qd times 0.05
+ *   9 + 2 n..     last action [m]
+ *   9 + 2 n + m.. those of TASK_FRAME_LIST (state.h) that the task has, the clock last */
 #ifndef TASK_OBSERVE_H
 #define TASK_OBSERVE_H
 
@@ -58,10 +58,12 @@ MILD_HD_FN void observe_frame(const TaskEnv *env, const TaskDef *def, const doub
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
-    float *q = frame + 9, *qd = q + joints, *action = qd + joints, *last = action + joints;
+    float *q = frame + 9, *qd = q + joints, *action = qd + joints, *last = action + env->shape.actions;
     for (int i = tile_lane(); i < joints; i += TILE) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);
+    }
+    for (int i = tile_lane(); i < env->shape.actions; i += TILE) {
         action[i] = env->action[0][i];
     }
     if (tile_lane() == 0) {

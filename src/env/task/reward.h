@@ -1,5 +1,5 @@
 /* Every reward of docs/task.md section 8, each its own short function, in one table with its
- * weight. */
+ * weight. Joints are those that the policy acts on: what the driven ones do is not its doing. */
 #ifndef TASK_REWARD_H
 #define TASK_REWARD_H
 
@@ -104,7 +104,7 @@ MILD_HD_FN Real reward_action_smoothness(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_reference_motion(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         const int foot = m->robot->joint_foot[i];
         const double bend = foot < 0 ? 0 : m->wanted[foot].bend;
         sum += task_square(m->q[i] - task_gait_joint(m->def, m->robot, bend, i));
@@ -120,13 +120,13 @@ MILD_HD_FN Real reward_default_pose(const TaskMotion *m) {
     Real away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
         Real leg = 0;
-        for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+        for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
             int same = m->robot->joint_foot[i] == f;
             leg += same ? task_square(still[i] * (m->q[i] - pose[i])) : 0;
         }
         away += task_sqrt(tile_sum(leg));
     }
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         all += task_square(m->q[i] - pose[i]);
     }
     return REAL(0.5) *
@@ -184,7 +184,7 @@ MILD_HD_FN Real reward_contact_force(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_torque(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         sum += task_square(m->torque[i]);
     }
     return tile_sum(sum);
@@ -192,7 +192,7 @@ MILD_HD_FN Real reward_torque(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_joint_speed(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         sum += task_square(m->qd[i]);
     }
     return tile_sum(sum);
@@ -200,7 +200,7 @@ MILD_HD_FN Real reward_joint_speed(const TaskMotion *m) {
 
 MILD_HD_FN Real reward_joint_acceleration(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         sum += task_square((m->qd[i] - m->qd_before[i]) / REAL(TASK_PERIOD));
     }
     return tile_sum(sum);
@@ -209,7 +209,7 @@ MILD_HD_FN Real reward_joint_acceleration(const TaskMotion *m) {
 /* What the cost of transport counts. */
 MILD_HD_FN Real reward_power(const TaskMotion *m) {
     Real sum = 0;
-    for (int i = tile_lane(); i < m->env->shape.joints; i += TILE) {
+    for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
         sum += REAL(fabs(m->torque[i] * m->qd[i]));
     }
     return tile_sum(sum);

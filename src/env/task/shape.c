@@ -15,12 +15,12 @@ static int frame_last(const TaskDef *def) {
 }
 
 TaskShape task_shape(const TaskDef *def, const Robot *robot) {
-    int joints = robot_joints(robot), feet = robot_feet(robot);
+    int joints = robot_joints(robot), actions = robot_actions(robot), feet = robot_feet(robot);
     TaskShape shape = {.joints = joints,
                        .feet = feet,
-                       .observation = 9 + 3 * joints + frame_last(def),
+                       .observation = 9 + 2 * joints + actions + frame_last(def),
                        .scan = def->scan > 0 ? task_scan_rows(def) * task_scan_columns(def) : 0,
-                       .actions = joints,
+                       .actions = actions,
                        .estimates = 3 + 4 * feet};
     shape.history = TASK_FRAMES * shape.observation + shape.scan;
     shape.critic = shape.observation + shape.estimates + 6 * feet + 34 + shape.scan;
@@ -37,7 +37,8 @@ int task_critic_ground(const TaskShape *shape) {
 TaskMirror task_mirror(const TaskDef *def, const Robot *robot) {
     static const float head[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
     TaskMirror mirror = {.observation_index = {0}};
-    int joints = robot_joints(robot), at = 9 + 3 * joints;
+    const int joints = robot_joints(robot), actions = robot_actions(robot);
+    int at = 9 + 2 * joints + actions;
     (void)def;
     for (int i = 0; i < 9; i++) {
         mirror.observation_index[i] = i;
@@ -46,9 +47,11 @@ TaskMirror task_mirror(const TaskDef *def, const Robot *robot) {
     for (int i = 0; i < joints; i++) {
         int other = robot_mirror_joint(robot)[i];
         float sign = (float)robot_mirror_sign(robot)[i];
-        mirror.action_index[i] = other;
-        mirror.action_sign[i] = sign;
-        for (int block = 0; block < 3; block++) { /* angles, speeds, actions */
+        if (i < actions) { /* the mirrored one too: see take_driven of robot/def.c */
+            mirror.action_index[i] = other;
+            mirror.action_sign[i] = sign;
+        }
+        for (int block = 0; block < (i < actions ? 3 : 2); block++) { /* angles, speeds, actions */
             mirror.observation_index[9 + block * joints + i] = 9 + block * joints + other;
             mirror.observation_sign[9 + block * joints + i] = sign;
         }

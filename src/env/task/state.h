@@ -57,11 +57,11 @@ enum { TASK_SCAN_MAX = 256 }; /* points */
 typedef struct {
     int joints;
     int feet;
-    int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds
-                        and last actions, those of TASK_FRAME_LIST (observe.h) */
+    int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds,
+                        last actions, those of TASK_FRAME_LIST (observe.h) */
     int scan;        /* points of the height scan (scan.h); 0: none */
     int history;     /* TASK_FRAMES frames, then the scan */
-    int actions;     /* one per joint */
+    int actions;     /* one for each joint that is not driven (driven.h) */
     int estimates;   /* base velocity 3, feet velocities 3 each, feet heights */
     int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.h), scan */
 } TaskShape;
@@ -173,9 +173,11 @@ typedef struct {
     double command_most; /* [m/s or m] highest command, see task_command_adapt; persists */
     Real assist_draw;    /* [-] share of the level used in this episode, in [0.5, 1) */
     Real push[6];        /* [m/s, rad/s] last push, for the critic; decays */
+    int drives;           /* bool: the driven joints move in this episode (driven.h) */
+    uint32_t driven_tick; /* at which their goals were drawn */
     /* state */
     TaskPose robot;
-    float action[3][TASK_JOINTS]; /* now, one and two steps ago */
+    float action[3][TASK_JOINTS]; /* now, one and two steps ago; then those of driven joints */
     Real torque[TASK_JOINTS];     /* [N m] of the last physics step */
     uint32_t oldest;              /* place of the oldest frame in the ring, the next to go */
     uint32_t held;                /* frames of the ring */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/random.h"
+#include "env/task/driven.h"
 #include "env/task/observe.h"
 #include "env/task/randomize.h"
 #include "env/task/reward.h"
@@ -157,6 +158,7 @@ MILD_HD_FN void task_draw_start(TaskEnv *env, const TaskDef *def, const RobotTab
                     : 0;
     env->step_first = env->step;
     tile_sync();
+    task_start_driven(env, def, robot);
     task_draw_drop(env, def, robot, height);
 }
 
@@ -235,8 +237,10 @@ MILD_HD_FN void task_push_base(TaskEnv *env, const TaskDef *def) {
 }
 
 /* What comes before the physics steps of a policy step. */
-MILD_HD_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action) {
+MILD_HD_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const RobotTable *robot,
+                                const float *action) {
     task_accept_action(env, def, action);
+    task_move_driven(env, def, robot);
     task_push_base(env, def);
 }
 

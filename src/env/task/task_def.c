@@ -33,6 +33,9 @@ TaskDef task_def_default(void) {
         .jump_stance = 0.6,
         .vy = {-0.3, 0.3},
         .wz = {-1.5, 1.5},
+        .driven_share = 0.8,
+        .driven_range = 0.5,
+        .driven_speed = {0.2, 2},
         .backward_share = 0.1,
         .backward_vx = {-0.6, 0},
         .standing_share = 0.05,
@@ -141,6 +144,7 @@ void task_def_choose_ground(TaskDef *def) {
 void task_def_make_nominal(TaskDef *def) {
     RandomizeDef *r = &def->randomize;
     task_def_choose_ground(def);
+    def->driven_share = 0;
     r->base_mass[0] = r->base_mass[1] = 0;
     r->com_offset = r->motor_offset = 0;
     r->link_mass[0] = r->link_mass[1] = 1;
@@ -196,6 +200,14 @@ const MildField task_fields[] = {
     T(jump_stance, D, 1, 0.1, 3, "[s] time on the feet between two jumps"),
     T(vy, D, 2, -3, 3, "[m/s] sideways command, low and high"),
     T(wz, D, 2, -3, 3, "[rad/s] turning command, low and high"),
+    T(driven_share, D, 1, 0, 1,
+      "[-] share of episodes in which the joints that robot.ini calls driven go to random goals, a "
+      "new one every 1 to 3 s; in the others they hold the pose"),
+    T(driven_range, D, 1, 0, 1,
+      "[-] how far such a goal is at most from the pose, as a share of the way to the joint's "
+      "limits"),
+    T(driven_speed, D, 2, 0.01, 20,
+      "[rad/s] speed with which a driven joint goes to a goal, drawn with it, low and high"),
     T(backward_share, D, 1, 0, 1, "[-] share of commands to walk backward"),
     T(backward_vx, D, 2, -4, 4, "[m/s] backward command, low and high"),
     T(standing_share, D, 1, 0, 1, "[-] share of commands to stand"),

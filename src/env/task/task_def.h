@@ -180,6 +180,9 @@ typedef struct {
     double jump[2];     /* [m] rise of the base in a jump; 0 0: the robot does not jump */
     double jump_start;  /* [m] highest one of a new robot: task_command_adapt */
     double jump_stance; /* [s] on the feet between two flights */
+    double driven_share;    /* [-] episodes in which the driven joints move (driven.h) */
+    double driven_range;    /* [-] of the way from their pose to the ends of their range */
+    double driven_speed[2]; /* [rad/s] their greatest speed, drawn with each goal */
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     int gait;              /* of task_gait_names; 0: the robot's own */

@@ -2,8 +2,9 @@
 
 #include <math.h>
 
-static void print_joints(FILE *csv, const Robot *robot, const char *what, const char *unit) {
-    for (int i = 0; i < robot_joints(robot); i++) {
+static void print_joints(FILE *csv, const Robot *robot, int count, const char *what,
+                         const char *unit) {
+    for (int i = 0; i < count; i++) {
         fprintf(csv, ",%s_%s%s", what, robot_joint_name(robot, i), unit);
     }
 }
@@ -13,12 +14,12 @@ void actions_print_header(FILE *csv, const TaskDef *task, const Robot *robot) {
     fprintf(csv, "trial,ground,speed_m_s,time_s,command_x_m_s,command_y_m_s,command_turn_rad_s,"
                  "phase,quaternion_w,quaternion_x,quaternion_y,quaternion_z,omega_x_rad_s,"
                  "omega_y_rad_s,omega_z_rad_s");
-    print_joints(csv, robot, "angle", "_rad");
-    print_joints(csv, robot, "speed", "_rad_s");
+    print_joints(csv, robot, shape.joints, "angle", "_rad");
+    print_joints(csv, robot, shape.joints, "speed", "_rad_s");
     for (int i = 0; i < shape.observation; i++) {
         fprintf(csv, ",observation%d", i);
     }
-    print_joints(csv, robot, "action", "");
+    print_joints(csv, robot, shape.actions, "action", "");
     fprintf(csv, "\n");
 }
 

@@ -205,13 +205,13 @@ static Results carve(const Trials *t, void *block) {
 }
 
 static MildStatus open_arrays(Trials *t, MildError *error) {
-    const size_t trials = (size_t)t->trials, joints = (size_t)robot_joints(t->run->robot);
+    const size_t trials = (size_t)t->trials, actions = (size_t)robot_actions(t->run->robot);
     const size_t history = (size_t)task_shape(&t->task, t->run->robot).history;
     t->samples = envs_physics_steps(t->envs);
     t->bytes = trials * ((size_t)t->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
                          4 * sizeof(uint8_t));
     t->block = calloc(1, t->bytes);
-    t->action = calloc(trials * joints, sizeof *t->action);
+    t->action = calloc(trials * actions, sizeof *t->action);
     t->command = calloc(trials, TASK_COMMANDS * sizeof *t->command);
     t->hold = calloc(trials, sizeof *t->hold);
     t->measure = calloc(trials, sizeof *t->measure);
@@ -226,7 +226,7 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
     }
     t->device_block = device_alloc(t->run->device, t->bytes, error);
     if (t->device_block) {
-        t->device_action = device_alloc(t->run->device, trials * joints * sizeof(float), error);
+        t->device_action = device_alloc(t->run->device, trials * actions * sizeof(float), error);
     }
     if (!t->device_action) {
         return MILD_ERROR_MEMORY;
@@ -278,8 +278,9 @@ static const float *newest_frame(const Trials *t, int trial) {
 /* after: the last physics step. */
 static void take_smooth(Trials *t, int trial, const EnvsSample *after) {
     const Controller *controller = t->run->controller;
-    const float *action = t->action + (size_t)trial * (size_t)after->joints;
-    smooth_take(&t->measure[trial].smooth, MEASURE_SETTLED, TASK_PERIOD, after,
+    const int actions = robot_actions(t->run->robot);
+    const float *action = t->action + (size_t)trial * (size_t)actions;
+    smooth_take(&t->measure[trial].smooth, MEASURE_SETTLED, TASK_PERIOD, after, actions,
                 controller->torque ? NULL : action,
                 task_action_scale(&t->task, robot_table(t->run->robot)), t->task.action_clip);
 }
@@ -327,7 +328,7 @@ static void show_decisions(const Trials *t, int step) {
                                        .trial = i,
                                        .time = step * TASK_PERIOD,
                                        .env = t->env[i],
-                                       .action = t->action + i * robot_joints(t->run->robot)};
+                                       .action = t->action + i * robot_actions(t->run->robot)};
         if (eval->callback && !is_over(t, i)) {
             eval->callback->decided(eval->callback->context, &decision);
         }
@@ -351,7 +352,7 @@ static MildStatus start(Trials *t, MildError *error) {
 static MildStatus step(Trials *t, int step, MildError *error) {
     const EvalRun *run = t->run;
     const Controller *controller = run->controller;
-    const size_t bytes = (size_t)t->trials * (size_t)robot_joints(run->robot) * sizeof *t->action;
+    const size_t bytes = (size_t)t->trials * (size_t)robot_actions(run->robot) * sizeof *t->action;
     const EnvsStep call = {.action = t->device_action,
                            .reward = t->device.reward,
                            .done = t->device.done,

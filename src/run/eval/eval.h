@@ -20,7 +20,7 @@ typedef struct {
     int trial;
     double time; /* [s] */
     TaskEnv *env;
-    const float *action; /* [robot_joints] */
+    const float *action; /* [robot_actions] */
 } EvalDecision;
 
 /* Called after each decision for a trial that is not over, trial by trial. */

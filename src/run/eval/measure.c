@@ -7,15 +7,15 @@
 #include "env/task/step.h"
 
 /* The base's angular velocity and the joints' speeds are those of the end of the step. */
-static void take_state(Smooth *s, const EnvsSample *after) {
+static void take_state(Smooth *s, const EnvsSample *after, int joints) {
     const double *w = after->omega;
     double joint = 0;
-    for (int i = 0; i < after->joints; i++) {
+    for (int i = 0; i < joints; i++) {
         joint += after->speed[i] * after->speed[i];
     }
     s->tilt += w[0] * w[0] + w[1] * w[1];
     s->yaw += w[2] * w[2];
-    s->joint += joint / after->joints;
+    s->joint += joint / joints;
     s->counted++;
 }
 
@@ -35,18 +35,18 @@ static void take_target(Smooth *s, int counts, const double *target, int joints)
     memcpy(s->target[0], target, (size_t)joints * sizeof *target);
 }
 
-void smooth_take(Smooth *s, double from, double period, const EnvsSample *after,
+void smooth_take(Smooth *s, double from, double period, const EnvsSample *after, int joints,
                  const float *action, double scale, double clip) {
     const int counts = s->steps >= SMOOTH_JERK_STEPS && s->steps * period >= from;
     double target[ROBOT_JOINTS_MAX];
     if (counts) {
-        take_state(s, after);
+        take_state(s, after, joints);
     }
     if (action) {
-        for (int i = 0; i < after->joints; i++) {
+        for (int i = 0; i < joints; i++) {
             target[i] = scale * fmin(fmax((double)action[i], -clip), clip);
         }
-        take_target(s, counts, target, after->joints);
+        take_target(s, counts, target, joints);
     }
     s->steps++;
 }

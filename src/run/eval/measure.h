@@ -36,9 +36,10 @@ typedef struct {
     double joint_speed; /* [rad/s] root mean square over joints */
 } Smoothness;
 
-/* A policy step of `period` [s]. after: its last physics step. action: clipped to +-clip, it moves
+/* A policy step of `period` [s]. after: its last physics step. joints: the first of the robot's,
+ * which are not driven. action: [joints] clipped to +-clip, it moves
  * a target by `scale` [rad]; NULL: torques were commanded. */
-void smooth_take(Smooth *smooth, double from, double period, const EnvsSample *after,
+void smooth_take(Smooth *smooth, double from, double period, const EnvsSample *after, int joints,
                  const float *action, double scale, double clip);
 /* Adds a trial's sums to those of others. */
 void smooth_add(Smooth *sum, const Smooth *trial);
