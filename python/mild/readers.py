@@ -418,14 +418,15 @@ def _with(found, more):
 def _mjlab(about, width):
     """mjlab's step, decisions and actuators are those of its velocity tasks, the layout mjlab; how many frames it sees is found from the input."""
     joints = about["joint_names"].names()
+    moved = about["action_joint_names"].names() if "action_joint_names" in about else joints  # of mild's own, where others are driven
     scale = about["action_scale"].numbers()
-    if len(scale) not in (1, len(joints)):
-        raise about["action_scale"].wrong(f"has {len(scale)} values, and there are {len(joints)} joints, so that it is not known which it moves")
+    if len(scale) not in (1, len(moved)):
+        raise about["action_scale"].wrong(f"has {len(scale)} values, and there are {len(moved)} joints, so that it is not known which it moves")
     terms = Observation(MJLAB)
     for name in about["observation_names"].names():
         terms.add(name)
-    found = {"policy": {"layout": "mjlab", "joints": joints}, "observation": terms.keys, "history": {"frames": 0, "stack": "term"},
-             "scale": dict(zip(joints, scale * len(joints) if len(scale) == 1 else scale))}
+    found = {"policy": {"layout": "mjlab", "joints": moved, "observed": joints}, "observation": terms.keys,
+             "history": {"frames": 0, "stack": "term"}, "scale": dict(zip(moved, scale * len(moved) if len(scale) == 1 else scale))}
     for section, key in (("kp", "joint_stiffness"), ("kd", "joint_damping"), ("default", "default_joint_pos")):
         found[section] = dict(zip(joints, about[key].numbers(len(joints))))
     if "phase_sin" in terms.keys:  # the metadata have no period

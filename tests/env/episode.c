@@ -26,6 +26,7 @@ Episode episode_of(const Envs *envs, int i) {
     }
     for (int k = 0; k < from->shape.joints; k++) {
         episode.kp_scale[k] = from->kp_scale[k];
+        episode.action[k] = from->action[0][k];
     }
     return episode;
 }

@@ -18,6 +18,7 @@ typedef struct {
     double command[3];              /* [m/s, m/s, rad/s] */
     double qpos[ROBOT_NQ_MAX];
     double kp_scale[ROBOT_JOINTS_MAX];
+    float action[ROBOT_JOINTS_MAX]; /* newest, of driven joints too */
 } Episode;
 
 /* Of environment i of the batch engine on the CPU. */

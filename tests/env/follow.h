@@ -12,6 +12,7 @@
 #include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
+#define G1_29 MILD_SOURCE_DIR "/robots/g1_29"
 
 enum { ENVS = 48, GROUNDS = 64, STEPS = 110 };
 
@@ -211,6 +212,7 @@ static void same_episode(int e) {
     }
     for (int i = 0; i < pair.shape.joints; i++) {
         assert_near(a->kp_scale[i], b.kp_scale[i], 1e-7);
+        assert_true(a->action[0][i] == b.action[i]);
     }
 }
 

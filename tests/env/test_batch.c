@@ -87,6 +87,39 @@ TEST(go1_follows_mujoco) {
     follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
+/* Arms that something else moves. Their targets are those of the CPU to the last bit. */
+static TaskDef driven_def(void) {
+    TaskDef def = some_def();
+    def.driven_share = 0.7;
+    def.action_scale = 0.1;
+    def.randomize.base_mass[0] = -1;
+    return def;
+}
+
+TEST(driven_joints_follow_mujoco) {
+    const TaskDef def = driven_def();
+    int moved = 0;
+    follow(G1_29, def, MILD_BATCH_HOST, NULL, 0.85);
+    pair_open(G1_29, &def, MILD_BATCH_HOST);
+    pair_reset();
+    memset(pair.a.action, 0, sizeof pair.a.action);
+    for (int t = 0; t < 40; t++) {
+        pair_step();
+    }
+    for (int e = 0; e < ENVS; e++) {
+        size_t bytes;
+        const char *envs = envs_state(pair.mujoco, &bytes);
+        const TaskEnv *a = (const TaskEnv *)(const void *)(envs + (size_t)e * (bytes / ENVS));
+        const Episode b = episode_of(pair.batch, e);
+        for (int i = pair.shape.actions; a->step == b.step && i < pair.shape.joints; i++) {
+            assert_true(a->action[0][i] == b.action[i]);
+            moved += a->action[0][i] != a->action[2][i];
+        }
+    }
+    assert_true(moved > 0);
+    pair_close();
+}
+
 /* A robot that is thrown diverges, and alone begins a new episode. */
 TEST(one_diverges) {
     const TaskDef def = some_def();
@@ -115,6 +148,7 @@ TEST(device_follows_mujoco) {
     follow(SA01, scan_def(), 0, &map, 0.85);
     follow(GO1, some_def(), 0, NULL, 0.85);
     follow(GO1, some_def(), 0, &map, 0.85);
+    follow(G1_29, driven_def(), 0, NULL, 0.85);
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI), 0, NULL, 0.85);
     follow(SA01, model_def(MILD_MODEL_ECC_QUASI_3D), 0, &map, 0.6);
     follow(SA01, model_def(MILD_MODEL_BEKKER), 0, NULL, 0.85);

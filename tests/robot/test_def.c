@@ -139,6 +139,7 @@ TEST(test_joint_keys) {
     expect_numbers("full_speed", def.full_speed, 4, zero);
     expect_numbers("swing", def.swing, 4, zero);
     expect_numbers("still", def.still, 4, zero);
+    assert_int_equal(def.driven, 0);
     def = accept(edit(
         "kd =", "stand_kp = 21 22 23 24\nstand_kd = 0.1 0.2 0.3 0.4\n"
                 "effort = 31 32 33 34\nspeed = 1 2 3 4\nfull_speed = 1 0 2 3\nswing = -1 2 -1 0\n"
@@ -152,6 +153,14 @@ TEST(test_joint_keys) {
         expect_numbers("column", got[k], 4, columns[k]);
     }
     expect_numbers("kd", def.kd, 4, kd);
+}
+
+TEST(test_driven) {
+    assert_int_equal(accept(edit("kd =", "driven = 0 0 1 1\nkd =")).driven, 2);
+    refuse("kd =", "driven = 1 1 0 0\nkd =", "[joints] driven 1 last");
+    refuse("kd =", "driven = 0 0 0 1\nkd =", "[joints] driven mirrored");
+    refuse("kd =", "driven = 0 0 0.5 0.5\nkd =", "[joints] driven 0 or 1");
+    refuse("kd =", "driven = 1 1 1 1\nkd =", "[joints] driven no joint is left to the policy");
 }
 
 TEST(test_foot_keys) {

@@ -23,14 +23,15 @@ static void add_numbers(Description *d, const char *key, const double *numbers, 
     snprintf(d->key[d->count++], DESCRIBE_KEY, "%s", key);
 }
 
-static void add_joint_names(Description *d, const Robot *robot) {
+/* The first `count` joints. */
+static void add_joint_names(Description *d, const char *key, const Robot *robot, int count) {
     char *value = d->value[d->count];
     size_t used = 0;
-    for (int i = 0; i < robot_joints(robot); i++) {
+    for (int i = 0; i < count; i++) {
         used += (size_t)snprintf(value + used, DESCRIBE_VALUE - used, "%s%s", i ? "," : "",
                                  robot_joint_name(robot, i));
     }
-    snprintf(d->key[d->count++], DESCRIBE_KEY, "joint_names");
+    snprintf(d->key[d->count++], DESCRIBE_KEY, "%s", key);
 }
 
 #define FRAME_NAME(name, has, value, sign) #name,
@@ -40,7 +41,10 @@ static void add_robot(Description *d, const Export *export, const TaskGains *gai
     const Robot *robot = export->robot;
     const int joints = robot_joints(robot);
     add(d, "robot", "%s", robot_name(robot));
-    add_joint_names(d, robot);
+    add_joint_names(d, "joint_names", robot, joints);
+    if (robot_actions(robot) < joints) {
+        add_joint_names(d, "action_joint_names", robot, robot_actions(robot));
+    }
     add_numbers(d, "default_joint_pos", robot_default_pose(robot), joints);
     add_numbers(d, "joint_stiffness", gains->kp, joints);
     add_numbers(d, "joint_damping", gains->kd, joints);
@@ -51,7 +55,7 @@ static void add_robot(Description *d, const Export *export, const TaskGains *gai
 }
 
 /* Neighbours of one name in TASK_FRAME_LIST are one quantity. */
-static void add_frame(Description *d, const TaskDef *def, int joints) {
+static void add_frame(Description *d, const TaskDef *def, const Robot *robot) {
     static const char *const name[] = {TASK_FRAME_LIST(FRAME_NAME) ""};
     const int has[] = {TASK_FRAME_LIST(FRAME_HAS)};
     char names[DESCRIBE_VALUE] = "", widths[DESCRIBE_VALUE] = "";
@@ -68,7 +72,8 @@ static void add_frame(Description *d, const TaskDef *def, int joints) {
     }
     add(d, "observation_names",
         "base_ang_vel,command,projected_gravity,joint_pos,joint_vel,last_action%s", names);
-    add(d, "observation_widths", "3,3,3,%d,%d,%d%s", joints, joints, joints, widths);
+    add(d, "observation_widths", "3,3,3,%d,%d,%d%s", robot_joints(robot), robot_joints(robot),
+        robot_actions(robot), widths);
 }
 
 static void add_rules(Description *d, const Export *export) {
@@ -78,7 +83,7 @@ static void add_rules(Description *d, const Export *export) {
     add(d, "action_scale", "%.9g", task_action_scale(task, robot_table(export->robot)));
     add(d, "action_clip", "%.9g", task->action_clip);
     add(d, "action_rule", "joint target [rad] = default_joint_pos + action_scale * action");
-    add_frame(d, task, robot_joints(export->robot));
+    add_frame(d, task, export->robot);
     add(d, "observation_rule",
         "angular velocity [rad/s] and unit gravity in the base's axes; command (forward, left "
         "[m/s], turning left [rad/s]) times 2, 2, 1; joint_pos minus default_joint_pos [rad]; "

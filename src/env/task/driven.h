@@ -76,8 +76,7 @@ MILD_HD_FN void task_start_driven(TaskEnv *env, const TaskDef *def, const RobotT
  */
 MILD_HD_FN double driven_next(DrivenGoal goal, double x, double before) {
     const double v = (x - before) / TASK_PERIOD;
-    const double wanted =
-        fmin(fmax((goal.angle - x) / DRIVEN_APPROACH, -goal.speed), goal.speed);
+    const double wanted = fmin(fmax((goal.angle - x) / DRIVEN_APPROACH, -goal.speed), goal.speed);
     return x + TASK_PERIOD * (v + (wanted - v) * (TASK_PERIOD / DRIVEN_QUICKNESS));
 }
 

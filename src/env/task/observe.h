@@ -58,7 +58,8 @@ MILD_HD_FN void observe_frame(const TaskEnv *env, const TaskDef *def, const doub
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
-    float *q = frame + 9, *qd = q + joints, *action = qd + joints, *last = action + env->shape.actions;
+    float *q = frame + 9, *qd = q + joints, *action = qd + joints,
+          *last = action + env->shape.actions;
     for (int i = tile_lane(); i < joints; i += TILE) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);

@@ -176,10 +176,10 @@ typedef struct {
     double episode;     /* [s] */
     double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
-    double vx_start;    /* [m/s] highest forward command of a new robot: task_command_adapt */
-    double jump[2];     /* [m] rise of the base in a jump; 0 0: the robot does not jump */
-    double jump_start;  /* [m] highest one of a new robot: task_command_adapt */
-    double jump_stance; /* [s] on the feet between two flights */
+    double vx_start;        /* [m/s] highest forward command of a new robot: task_command_adapt */
+    double jump[2];         /* [m] rise of the base in a jump; 0 0: the robot does not jump */
+    double jump_start;      /* [m] highest one of a new robot: task_command_adapt */
+    double jump_stance;     /* [s] on the feet between two flights */
     double driven_share;    /* [-] episodes in which the driven joints move (driven.h) */
     double driven_range;    /* [-] of the way from their pose to the ends of their range */
     double driven_speed[2]; /* [rad/s] their greatest speed, drawn with each goal */
