@@ -83,7 +83,7 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     }
     if (robot_actions(def->robot) < robot_joints(def->robot)) {
         mild_fail(error, MILD_ERROR_ARGUMENT,
-                  "drive: robot %s has joints that another program moves (driven in robot.ini), "
+                  "robot %s has joints that another program moves (driven in robot.ini), "
                   "and a packet's targets are of all joints",
                   robot_name(def->robot));
         return NULL;

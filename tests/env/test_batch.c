@@ -97,13 +97,14 @@ static TaskDef driven_def(void) {
 }
 
 TEST(driven_joints_follow_mujoco) {
-    const TaskDef def = driven_def();
+    TaskDef def = driven_def();
     int moved = 0;
     follow(G1_29, def, MILD_BATCH_HOST, NULL, 0.85);
+    def.episode = 24;
     pair_open(G1_29, &def, MILD_BATCH_HOST);
     pair_reset();
     memset(pair.a.action, 0, sizeof pair.a.action);
-    for (int t = 0; t < 40; t++) {
+    for (int t = 0; t < 180; t++) { /* the second goals of most */
         pair_step();
     }
     for (int e = 0; e < ENVS; e++) {
@@ -116,7 +117,7 @@ TEST(driven_joints_follow_mujoco) {
             moved += a->action[0][i] != a->action[2][i];
         }
     }
-    assert_true(moved > 0);
+    assert_true(moved > 100);
     pair_close();
 }
 

@@ -170,6 +170,25 @@ TEST(rewards_are_of_own_joints) {
     rig_close(&rig);
 }
 
+/* The whole helping hand holds a robot that does nothing, whose base is a light pelvis, without
+ * ringing from step to step of the physics. */
+TEST(the_helping_hand_is_steady) {
+    TaskDef def = moving_def();
+    def.physics_dt = 0.005;
+    def.assist = 1;
+    def.driven_share = 0;
+    double rate = 0;
+    Rig rig;
+    rig_open(&rig, &def, 3, 0);
+    rig_start(&rig, 0, 0, 0);
+    for (int t = 0; t < 50; t++) {
+        rig_step(&rig, (float[ACTIONS]){0});
+        rate = fmax(rate, fabs(rig.env->robot.qvel[4]));
+    }
+    assert_true(rate < 2);
+    rig_close(&rig);
+}
+
 /* The image of the image is what it was; each joint's numbers are those of the joint on the other
  * side. */
 TEST(mirror_image) {
