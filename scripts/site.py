@@ -12,10 +12,12 @@ import shutil
 import subprocess
 import sys
 
+import arena
 import links
 import notebook
 
 HERE = pathlib.Path(__file__).resolve().parent
+ARENA = "../arena/index.html"  # seen from the pages in docs
 PICTURES = (".png", ".webp", ".svg", ".csv")
 KINDS = {".c": "c", ".h": "c", ".cu": "cuda", ".cpp": "cpp", ".py": "python", ".sh": "bash", ".json": "json", ".ini": "ini", ".xml": "xml",
          ".ipynb": "json", ".cff": "yaml", ".mjs": "javascript", ".js": "javascript"}
@@ -75,6 +77,9 @@ class Tree:
             self.write(book, notebook.notebook(text))
             text += f"\n[This page as a notebook]({os.path.basename(book)}){{ download }}\n"
             return self.linked(name, text, {os.path.basename(book)})
+        if name == "docs/public-policies.md":
+            text += f"\n[The arena: this table as a page to sort]({ARENA})\n"
+            return self.linked(name, text, {ARENA})
         return self.linked(name, text, set())
 
     def linked(self, name, text, made):
@@ -181,6 +186,7 @@ def main(folder):
     tree = Tree(folder.with_name(folder.name + "-pages"))
     for name in ("site.css", "iframe-worker.js"):
         tree.write(f"assets/{name}", (HERE / name).read_text(encoding="utf-8"))
+    arena.make_page(tree.folder / "arena", docs="../docs/")
     build(tree, folder / number, number)
     numbers = sorted((path.parent.name for path in folder.glob("*/index.html")), key=lambda text: [int(part) for part in text.split(".")], reverse=True)
     (folder / "versions.json").write_text(json.dumps([{"version": text, "title": text, "aliases": []} for text in numbers]), encoding="utf-8")
