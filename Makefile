@@ -42,7 +42,7 @@ help:
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
-	@echo "make site    all documentation as a site with search, build/site/index.html, with its links checked"
+	@echo "make site    all documentation as a site with search and the page of the arena, build/site/index.html, with its links checked"
 	@echo "make wheels  the Python package with the program as one wheel, build/dist, tried in bare environments (PYTHONS=FILES: of these interpreters);"
 	@echo "             TEST=1: in a bare Debian 12 too; TEST=\"trixie forky\": in others"
 	@echo "make wheel-cuda  the compiled files for GPUs as a wheel beside it, for ARCHS=90 or for all"
@@ -89,7 +89,7 @@ check:
 	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
 
 nightly:
-	@$(MAKE) --no-print-directory check STAGES="$(or $(STAGES),long analyzer sanitize_all thread vectors recipes)"
+	@$(MAKE) --no-print-directory check STAGES="$(or $(STAGES),long analyzer sanitize_all thread vectors notebooks recipes)"
 
 plugin-check: build
 	@if [ -n "$(VERSION)" ]; then tests/plugin/test_version.sh "$(VERSION)" build; else $(MAKE) --no-print-directory wheel && \

@@ -13,6 +13,7 @@
 #   sanitize_all  as sanitize, every test, the long ones begun
 #   thread    gcc, thread sanitizer: pool, task, evaluation, training
 #   vectors   the layers with loops over vectors, for AVX2 and for AVX-512 with vectors of 512 bits: their tests (256: make test)
+#   notebooks the notebook of each tutorial, in Jupyter's kernel, from a wheel that is made for it
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a task, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -150,6 +151,10 @@ stage_wheel() {
 
 stage_recipes() {
     tests/install/test_contributing.py . --run --jobs "$jobs"
+}
+
+stage_notebooks() {
+    make --no-print-directory notebook-check
 }
 
 stage_site() {

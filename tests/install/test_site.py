@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """The site of `make site` in headless Chromium, from files and from a server: the pages of the menu on a dark desktop and a light phone
 (with --shots also the other way round). Nothing is asked of another machine, no error, no page wider than the screen, every picture there, text that can be told
-from its ground; a search finds, the version is chosen, a tutorial is two clicks from home.
+from its ground; a search finds, the version is chosen, the arena sorts, a tutorial is two clicks from home.
 Usage: test_site.py SOURCE_FOLDER [SITE_FOLDER] [--shots FOLDER]"""
 import argparse
 import functools
 import http.server
+import json
 import pathlib
 import re
 import sys
@@ -31,7 +32,7 @@ class Browser(web_test.Browser):
 
 MENU = "JSON.stringify([...document.querySelectorAll('.md-nav--primary a.md-nav__link, .md-tabs__link')].map(a => a.href.split('#')[0]))"
 WIDER = """[...document.querySelectorAll('article *')].filter(e => e.getBoundingClientRect().right > innerWidth + 1
-    && !e.closest('.md-typeset__scrollwrap, pre, .highlight, nav')).map(e => e.outerHTML.slice(0, 80))[0]
+    && !e.closest('.md-typeset__scrollwrap, .wide, pre, .highlight, nav')).map(e => e.outerHTML.slice(0, 80))[0]
     || (document.documentElement.scrollWidth > innerWidth ? 'the page' : '')"""
 MISSING = "[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)[0] || ''"
 CONTRAST = """(() => {
@@ -51,6 +52,9 @@ CONTRAST = """(() => {
 SEARCH = """(() => { const q = document.querySelector('.md-search__input'); document.querySelector('#__search').click(); q.focus();
     setTimeout(() => { q.value = 'bevameter plate'; q.dispatchEvent(new InputEvent('input', {bubbles: true}));
                        q.dispatchEvent(new Event('keyup', {bubbles: true})) }, 500) })()"""
+SORT = """(() => { const [policy, s50] = document.querySelectorAll('table.s50 th button'), rows = document.querySelector('table.s50').tBodies[0].rows;
+    const said = button => { button.click(); return [...rows].map(row => row.cells[button === policy ? 0 : 1].dataset.v).join(' ') };
+    return JSON.stringify([said(policy), said(s50), said(s50)]) })()"""
 FOUND = "[...document.querySelectorAll('.md-search-result__link')].map(a => a.href)[0] || ''"
 faults = []
 
@@ -77,6 +81,15 @@ def searched(browser, address, name):
     found = browser.wait(FOUND, 10)
     if not found or not re.search("/docs/(model|grains|soil|tutorials)", found):
         faults.append(f"{name}: a search for plates finds {found}")
+
+
+def sorted_rows(browser, address, name):
+    """The page of the arena by name, by S50, and by S50 downward."""
+    look(browser, address, name)
+    names, up, down = (text.split() for text in json.loads(browser.value(SORT)))
+    numbers = [float(text) for text in up]
+    if len(names) < 20 or names != sorted(names, key=str.lower) or numbers != sorted(numbers) or down != up[::-1] and sorted(map(float, down)) != numbers:
+        faults.append(f"{name}: the arena does not sort: {names} {up} {down}")
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -108,6 +121,7 @@ for name, width, height, dark in kinds if given.shots else kinds[:2]:
             faults.append(f"only {len(pages)} pages in the menu")
     for page in pages:
         look(browser, page, name)
+    sorted_rows(browser, f"{(site / version).as_uri()}/arena/index.html", name)
     searched(browser, home, name)
     browser.close()
 

@@ -301,6 +301,65 @@ class Script(unittest.TestCase):
             self.assertRegex(status, "^public_policies: --only: no policy is named nobody; there are")
 
 
+class Arena(unittest.TestCase):
+    """scripts/arena.py: the page and the letters."""
+
+    S50 = ("policy,sweep,unit,verdict,S50,low,high,trials,upright\nunitree_h1,stiffness,MPa/m,inside,10,8,12.5,20,10\nmild_g1,stiffness,MPa/m,open,0.2,,1,20,9\n"
+           "grove_g1,stiffness,MPa/m,never_falls,,,0.1,8,8\nno<body,stiffness,MPa/m,always_falls,,1000,,8,0\nunitree_h1,slip,mm,inside,3,2.9,3.1,20,9\n")
+    TRIALS = ("policy,ground,trials,upright,speed [m/s],cost,largest torque [N m],sinkage [m],median fall [s]\n"
+              "unitree_h1,rigid,10,10,0.464,0.3,1.0,0.0,\nunitree_h1,grass,10,0,,,1.0,0.1,1.57\n")
+
+    def setUp(self):
+        sys.path.insert(0, str(ROOT / "scripts"))
+        import arena
+
+        self.arena, work = arena, tempfile.TemporaryDirectory()
+        self.addCleanup(work.cleanup)
+        self.folder = pathlib.Path(work.name)
+        for name in ("cite.md", "model.md", "LICENSE-DATA.txt"):
+            (self.folder / name).write_text((ROOT / "docs" / name).read_text())
+        (self.folder / "s50.csv").write_text(self.S50)
+        (self.folder / "public-policies.csv").write_text(self.TRIALS)
+
+    def test_marks(self):
+        """The measured grounds lie where a sweep draws them."""
+        self.assertEqual(set(self.arena.GROUNDS), set(sweep.MEASURED))
+        for name, value in sweep.marks("stiffness").items():
+            self.assertAlmostEqual(self.arena.marks()[name] / value, 1, delta=0.006)
+
+    def test_page(self):
+        """Rows by S50, bars from there to the right end, bounds, other columns, nothing that is taken for HTML."""
+        with unittest.mock.patch.object(self.arena, "DOCS", self.folder):
+            self.arena.make_page(self.folder / "page")
+        page = (self.folder / "page/index.html").read_text()
+        rows = re.findall(r"^<tr.*<td class=\"chart\">.*$", page, re.M)
+        self.assertEqual([re.search(r'data-v="(.*?)"', row)[1] for row in rows], ["grove_g1", "mild_g1", "unitree_h1", "no&lt;body"])
+        self.assertEqual([re.search(r'<b style="left:(.*?)%', row)[1] for row in rows], ["0.0", "7.5", "50.0", "100.0"])
+        self.assertEqual(re.search(r'<s style="left:(.*?)%;width:(.*?)%', rows[2]).groups(), ("47.6", "4.8"))
+        self.assertEqual([re.search(r'<td class="number" data-v=.*?>(.*?)<', row)[1] for row in rows],
+                         ["&lt; 0.1", "0.2 (? to 1)", "10 (8 to 12.5)", "&gt; 1e+03"])
+        self.assertEqual([row.startswith("<tr class=ours>") for row in rows], [False, True, False, False])
+        self.assertIn("10 of 10, 0.46 m/s", rows[2])
+        self.assertIn("At the stiffness of a gym mat (4 MPa/m) 2 of 3 public bipeds fall in most trials, at that of a carpet (20) 1.", page)
+        self.assertRegex(page, r"<td>slip<td class=\"number\">3 \(2.9 to 3.1\)")
+        self.assertRegex(page, r'data-v="1.0" class=all>10<td data-v="0.0" class=none>0')
+        self.assertNotRegex(page, r"no<body|\$[a-z]|(src|href)=\"http[^\"]*\.(js|css)")
+        self.assertEqual((self.folder / "page/s50.csv").read_text(), self.S50)
+
+    def test_letters(self):
+        """One for each policy of others; it has the commit, the port and what came out."""
+        with unittest.mock.patch.object(self.arena, "DOCS", self.folder), contextlib.redirect_stdout(io.StringIO()):
+            self.arena.write_letters(self.folder / "letters", None)
+            with self.assertRaisesRegex(SystemExit, "^arena: --only: no policy of others is named mild_g1; there are"):
+                self.arena.write_letters(self.folder / "letters", ["mild_g1"])
+        self.assertEqual({path.name for path in (self.folder / "letters").iterdir()}, {"unitree_h1.txt", "grove_g1.txt"})
+        text = (self.folder / "letters/unitree_h1.txt").read_text()
+        for words in ("276801e46c5d433564f24658bac64f254b7d2d4b", "S50 of stiffness  10 (8 to 12.5) MPa/m, 20 trials", "10 of 10 upright, 0.46 m/s", "half of the falls by 1.6 s",
+                      "mild trial resources/robots/h1/scene.xml", (ROOT / "examples/trial/unitree_h1.ini").read_text().strip()):
+            self.assertIn(words, text)
+        self.assertIn("scene_29dof.xml of unitree_mujoco", (self.folder / "letters/grove_g1.txt").read_text())
+
+
 class Commands(unittest.TestCase):
     run_main = Command.run_main
 
