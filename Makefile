@@ -184,6 +184,7 @@ wheels: setup
 python-check: wheel
 	@$(call with_wheel,learners)
 	@build/learners-venv/bin/python tests/python/check_learners.py
+	@build/learners-venv/bin/python tests/python/check_ppo.py
 	@build/learners-venv/bin/python tests/python/test_gradients.py
 	@build/learners-venv/bin/python lab/paper/tests/test_learners.py .
 	@build/learners-venv/bin/python tests/python/check_cuda.py

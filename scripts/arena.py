@@ -24,7 +24,7 @@ LOW, HIGH = 0.1, 1000.0  # [MPa/m] ends of the axis: the range of `mild trial --
 GROUNDS = {"dry_sand_loose": "loose dry sand", "dry_sand_close": "close dry sand", "moist_sand": "moist sand", "gym_mat": "gym mat", "carpet": "carpet",
            "groomed_snow": "groomed snow", "artificial_turf": "artificial turf", "rubber_tile": "rubber tile", "running_track": "running track"}
 FOUR_LEGS = re.compile(r"\b(Go1|Go2|B2)\b")
-FILM = "two-g1.webp"
+FILM, CURVE = "two-g1.webp", "s50.png"
 text = html.escape
 
 
@@ -182,15 +182,16 @@ def make_page(folder, docs=""):
     others = [policy for policy in found.values() if not policy.ours]
     undone = sorted(set(found) - {policy.name for policy in measured})
     entry = re.search(r"^@software\{.*?^\}", (DOCS / "cite.md").read_text(encoding="utf-8"), re.M | re.S).group()
+    curve = f'<figure><img src="{CURVE}" alt="Chance to stay up by stiffness"><figcaption>A sweep: trials, the chance to stay up, S50 and its interval.</figcaption></figure>'
     film = f'<figure><img src="{FILM}" alt="Two G1 on loose sand"><figcaption>Two G1 on loose sand: Unitree\'s policy falls, ours walks.</figcaption></figure>'
     page = string.Template((ROOT / "scripts/arena.html").read_text(encoding="utf-8")).substitute(
         policies=len(others), says=says(measured, grounds), axis=axis(grounds), rows="\n".join(s50_row(policy, grounds) for policy in measured),
         undone=f" Without an S50: {text(', '.join(undone))}." if undone else "", sweeps=sweeps_table(measured),
         grounds=grounds_table(sorted(found.values(), key=lambda policy: (policy not in measured, measured.index(policy) if policy in measured else 0))),
-        film=film if (DOCS / FILM).is_file() else "", citation=text(entry), version=version(), licence='<a href="LICENSE-DATA.txt">text</a>',
+        film=film if (DOCS / FILM).is_file() else "", curve=curve if (DOCS / CURVE).is_file() else "", citation=text(entry), version=version(), licence='<a href="LICENSE-DATA.txt">text</a>',
         page=f'All about it: <a href="{docs}public-policies.html">Anybody\'s policy on soft ground</a>.' if docs else "All about it: docs/public-policies.md.")
     (folder / "index.html").write_text(page, encoding="utf-8")
-    for name in ("s50.csv", "public-policies.csv", "LICENSE-DATA.txt", FILM):
+    for name in ("s50.csv", "public-policies.csv", "LICENSE-DATA.txt", FILM, CURVE):
         if (DOCS / name).is_file():
             shutil.copy(DOCS / name, folder / name)
 
