@@ -23,7 +23,7 @@ DOCS = ROOT / "docs"
 LOW, HIGH = 0.1, 1000.0  # [MPa/m] ends of the axis: the range of `mild trial --sweep stiffness`
 GROUNDS = {"dry_sand_loose": "loose dry sand", "dry_sand_close": "close dry sand", "moist_sand": "moist sand", "gym_mat": "gym mat", "carpet": "carpet",
            "groomed_snow": "groomed snow", "artificial_turf": "artificial turf", "rubber_tile": "rubber tile", "running_track": "running track"}
-FOUR_LEGS = re.compile(r"\b(Go1|Go2|B2)\b")
+FOUR_LEGS = ("Go1", "Go2", "B2", "Lite3")
 FILM, CURVE = "two-g1.webp", "s50.png"
 text = html.escape
 
@@ -45,15 +45,18 @@ class Policy:
     def __init__(self, name):
         self.name, self.sweeps, self.trials = name, {}, {}
         known = public_policies.POLICIES.get(name)
-        self.robot, self.model, self.file, *self.options = known or ("", "", "")
+        self.robot, self.model, self.file, *options = known or ("", "", "")
+        self.options = " ".join(options).replace(f"{{clones}}/{self.file.split('/')[0]}/", "").replace("{clones}/", "").replace("{trial}", "examples/trial")
         folder = self.file.split("/")[0]
         self.ours = self.file.startswith("/")
         self.place, self.commit, self.licence = public_policies.REPOSITORIES.get(folder, ("", "", ""))
-        self.port = f"examples/trial/{name}.ini" if (ROOT / f"examples/trial/{name}.ini").is_file() else ""
+        own = [f"examples/trial/{name}.ini", *re.findall(r"examples/trial/\S+", self.options)]
+        self.port = next((file for file in own if (ROOT / file).is_file()), "")  # '': what comes with the policy
+        self.speed = float(next(iter(re.findall(r"--speed (\S+)", self.options)), 0.5))  # [m/s] of the command
 
     @property
     def legs(self):
-        return 4 if FOUR_LEGS.search(self.robot) else 2
+        return 4 if any(robot in self.robot for robot in FOUR_LEGS) else 2
 
     @property
     def order(self):
@@ -212,11 +215,11 @@ def letter(policy, grounds):
         results.append(f"  {ground:16}  {row['upright']} of {row['trials']} upright{speed}{fall}")
     port = f"{policy.port} of our tree, below" if policy.port else "what your repository has, read as it is"
     below = f"\n\n{policy.port}:\n\n{(ROOT / policy.port).read_text(encoding='utf-8').strip()}" if policy.port else ""
-    command = " ".join(["mild trial", inside(policy.model), inside(policy.file), *([f"--describe {policy.port}"] if policy.port else []),
-                        "--seconds 20 --speed 0.5 --sweep stiffness",
-                        *(option.replace("{clones}/" + policy.file.split("/")[0] + "/", "") for option in policy.options)])
+    options = ["--describe " + policy.port if policy.port and "--describe" not in policy.options else "", policy.options,
+               f"--speed {policy.speed:g}" if "--speed" not in policy.options else "", "--seconds 20 --sweep stiffness"]
+    command = " ".join(["mild trial", inside(policy.model), inside(policy.file), *filter(None, options)])
     return string.Template((ROOT / "scripts/letter.txt").read_text(encoding="utf-8")).substitute(
-        place=policy.place, name=policy.name, robot=policy.robot, commit=policy.commit, policy=inside(policy.file), port=port, command=command,
+        place=policy.place, speed=f"{policy.speed:g}", name=policy.name, robot=policy.robot, commit=policy.commit, policy=inside(policy.file), port=port, command=command,
         model=inside(policy.model) if policy.model.split("/")[0] == policy.file.split("/")[0] else f"{inside(policy.model)} of {policy.model.split('/')[0]}",
         results="\n".join(results), below=below, track=digits(grounds["running_track"]), mat=digits(grounds["gym_mat"]), sand=digits(grounds["dry_sand_close"]))
 

@@ -357,6 +357,10 @@ class Arena(unittest.TestCase):
         for words in ("276801e46c5d433564f24658bac64f254b7d2d4b", "S50 of stiffness  10 (8 to 12.5) MPa/m, 20 trials", "10 of 10 upright, 0.46 m/s", "half of the falls by 1.6 s",
                       "mild trial resources/robots/h1/scene.xml", (ROOT / "examples/trial/unitree_h1.ini").read_text().strip()):
             self.assertIn(words, text)
+        for name, words in (("playground_g1", "mild trial mujoco_playground/_src/locomotion/g1/xmls/scene_mjx_feetonly_flat_terrain.xml mujoco_playground/experimental/"
+                                              "sim2sim/onnx/g1_policy.onnx --describe examples/trial/playground_g1.ini --speed 0.5 --seconds 20 --sweep stiffness"),
+                            ("h1_2_sim2sim", "--describe mujoco/model_and_yaml/walk/"), ("run_amp_g1", "policy1.onnx --speed 0.8 --seconds 20")):
+            self.assertIn(words, self.arena.letter(self.arena.Policy(name), self.arena.marks()))
         self.assertIn("scene_29dof.xml of unitree_mujoco", (self.folder / "letters/grove_g1.txt").read_text())
 
 
