@@ -87,8 +87,8 @@ def sorted_rows(browser, address, name):
     """The page of the arena by name, by S50, and by S50 downward."""
     look(browser, address, name)
     names, up, down = (text.split() for text in json.loads(browser.value(SORT)))
-    numbers = [float(text) for text in up]
-    if len(names) < 20 or names != sorted(names, key=str.lower) or numbers != sorted(numbers) or down != up[::-1] and sorted(map(float, down)) != numbers:
+    up, down = list(map(float, up)), list(map(float, down))
+    if len(names) < 20 or names != sorted(names, key=str.lower) or up != sorted(up) or down != up[::-1]:
         faults.append(f"{name}: the arena does not sort: {names} {up} {down}")
 
 
