@@ -39,6 +39,19 @@ REPOSITORIES = {  # folder of CLONES: place, commit, licence
     "unitree_h12_sim2sim": ("correlllab/unitree_h12_sim2sim", "a915b1ed8040caa931d14ba806f346f439db98a4", "none"),
     "engineai_humanoid": ("engineai-robotics/engineai_humanoid", "5c0cb92a99819744abe0511291533fc37e556903", "none"),
     "engineai_legged_gym": ("engineai-robotics/engineai_legged_gym", "1a659aa0aa77445766ecea6d95708a5812e9f290", "none"),
+    "felipeosmar": ("felipeosmar/unitree_rl_mjlab", "a31f35010f1e299ff7f042a02d1d1e7032f7115a", "Apache-2.0"),
+    "PMY9527": ("PMY9527/unitree_rl_lab", "25d7e9fb240a92e983fa472c23858948b1ab897a", "Apache-2.0"),
+    "liamlate": ("liamlate/unitree_rl_mjlab", "7407c941261d21d94b78a08d35938f98d1a375c7", "Apache-2.0"),
+    "TR-ROBOTICS": ("TR-ROBOTICS/unitree_rl_lab", "9722ebb53e4b6e0a0f799da4cd1d770f90717ec1", "Apache-2.0"),
+    "tuffi3000": ("tuffi3000/unitree_rl_mjlab", "e7e3065b8bce3388ecd95f8fa405997b4f4717e1", "Apache-2.0"),
+    "G1DWAQ_Lab": ("liuyufei-nubot/G1DWAQ_Lab", "a3afa5ca6837c14e4300198c19e6a6431bbafc81", "BSD-3-Clause"),
+    "LeggedLabDeploy": ("Hellod035/LeggedLabDeploy", "93736b4466b9de2a75cb9b0099cbce6cbacdd86a", "BSD-3-Clause"),
+    "TienKung-Lab": ("Open-X-Humanoid/TienKung-Lab", "7ce828b22139378d7a032ee4eeb52151bd322cf3", "BSD-3-Clause"),
+    "booster_deploy": ("BoosterRobotics/booster_deploy", "563e7c37e7468b3b96ad9f84f9e61becea3b7fb8", "Apache-2.0"),
+    "booster_assets": ("BoosterRobotics/booster_assets", "486da0f864016676de6dab724fd60a8a551655d1", "BSD-3-Clause"),
+    "Lite3_rl_deploy": ("DeepRoboticsLab/Lite3_rl_deploy", "7871b47020b615812612192534b966ea23ba4d2e", "BSD-3-Clause"),
+    "weihan_lite3": ("weihanhuang-1196/p3_modified_Lite3_rl_deploy", "a6dbdd62494f594f50c1469ace5dbe0a498dbd9c", "BSD-3-Clause"),
+    "deep_robotics_model": ("DeepRoboticsLab/deep_robotics_model", "b452a1f404d37155400242f18e454fed8bcc51b8", "BSD-3-Clause"),
     "pnd_rl_mjlab": ("pndbotics/pnd_rl_mjlab", "6c724bf11823c9b9d50f78d86662b721dc1a8bfe", "Apache-2.0"),
 }
 GYM, SIM2SIM = "unitree_rl_gym/deploy/pre_train/{}/motion.pt", "mujoco_playground/mujoco_playground/experimental/sim2sim/onnx/{}_policy.onnx"
@@ -48,7 +61,10 @@ HOLOSOMA = "holosoma/src/holosoma/holosoma/data/robots/{}"
 LOCO = "holosoma/src/holosoma_inference/holosoma_inference/models/loco/{}"
 LAB = "legged_rl_lab/deploy/g1_deploy/{}"
 DEPLOY = "unitree_g1_deploy/deploy/robots/g1/config/policy/{}"
-POLICIES = {  # name: robot, model, policy, options. Described by its ini in examples/trial, and where there is none by what comes with it
+VELOCITY = "{}/deploy/robots/{}/config/policy/velocity/v0/exported/{}"
+GO2, GO2_POLICIES = "unitree_mujoco/unitree_robots/go2/scene.xml", "legged_rl_deploy/policies/go2/{}"
+LITE3, DWAQ = "deep_robotics_model/Lite3/Lite3_mjcf/mjcf/Lite3.xml", "G1DWAQ_Lab/LeggedLabDeploy/{}"
+POLICIES = {  # name: robot, model, policy, options. Described by its ini in examples/trial, else by what comes with it or the options name
     "unitree_g1": ("Unitree G1, 12 joints", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_g1_sole": ("Unitree G1, 12 joints, sole of its mesh", "unitree_rl_gym/resources/robots/g1_description/scene.xml", GYM.format("g1")),
     "unitree_h1": ("Unitree H1", "unitree_rl_gym/resources/robots/h1/scene.xml", GYM.format("h1")),
@@ -79,9 +95,11 @@ POLICIES = {  # name: robot, model, policy, options. Described by its ini in exa
     "engineai_sa01": ("EngineAI SA01", "engineai_legged_gym/resources/robots/zq_humanoid/urdf/zq_sa01.xml",
                       "engineai_humanoid/EngineAI_Controller/user/EngineAI_Humanoid_Controller/Controllers/RL_Controller/policy/zqsa01/zqsa01_policy.onnx"),
     "holosoma_g1": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/fastsac_g1_29dof.onnx")),
-    "holosoma_g1_ppo": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/ppo_g1_29dof.onnx")),
+    "holosoma_g1_ppo": ("Unitree G1, 29 joints", HOLOSOMA.format("g1/scenes/scene_g1_29dof_wbt_plane.xml"), LOCO.format("g1_29dof/ppo_g1_29dof.onnx"),
+                        "--describe {trial}/holosoma_g1.ini"),
     "holosoma_t1": ("Booster T1, 29 joints", HOLOSOMA.format("t1/t1_29dof.xml"), LOCO.format("t1_29dof/fastsac_t1_29dof.onnx")),
-    "holosoma_t1_ppo": ("Booster T1, 29 joints", HOLOSOMA.format("t1/t1_29dof.xml"), LOCO.format("t1_29dof/ppo_t1_29dof.onnx")),
+    "holosoma_t1_ppo": ("Booster T1, 29 joints", HOLOSOMA.format("t1/t1_29dof.xml"), LOCO.format("t1_29dof/ppo_t1_29dof.onnx"),
+                        "--describe {trial}/holosoma_t1.ini"),
     "legged_rl_lab_g1": ("Unitree G1, 29 joints", LAB.format("assets/scene_29dof.xml"), LAB.format("exported_policy/g1_flat_1.onnx")),
     "legged_rl_lab_g1_amp": ("Unitree G1, 29 joints", LAB.format("assets/scene_29dof.xml"), LAB.format("exported_policy/g1_walk.onnx")),
     "homie_g1": ("Unitree G1, 12 joints", "OpenHomie/HomieRL/legged_gym/resources/robots/g1_description/g1.xml", "OpenHomie/HomieDeploy/deploy.onnx"),
@@ -93,6 +111,33 @@ POLICIES = {  # name: robot, model, policy, options. Described by its ini in exa
     "h1_2_sim2sim": ("Unitree H1-2, 27 joints", "unitree_h12_sim2sim/mujoco/h1_2/h1_2_handless.xml",
                      "unitree_h12_sim2sim/wbc_agile_utils/logs/rsl_rl/unitree_h12_walk/2026-01-21_11-22-09/exported/policy.onnx",
                      "--describe {clones}/unitree_h12_sim2sim/mujoco/model_and_yaml/walk/unitree_h12_walk_v0_IO_descriptors.yaml"),
+    "tr_robotics_g1": ("Unitree G1, 29 joints", G1, VELOCITY.format("TR-ROBOTICS", "g1_29dof", "policy.onnx")),
+    "tuffi3000_g1": ("Unitree G1, 29 joints", G1, VELOCITY.format("tuffi3000", "g1", "policy-promising.onnx")),
+    "robomimic_g1": ("Unitree G1, 29 joints", G1, "rl_sar/policy/g1/robomimic/locomotion/policy_29dof.pt",
+                     "--describe {clones}/rl_sar/policy/g1/robomimic/locomotion/config.yaml"),
+    "geoloco_g1": ("Unitree G1, 29 joints", G1, DWAQ.format("policy/g1/exported/policy.onnx"), "--describe {clones}/" + DWAQ.format("configs/g1.yaml")),
+    "dwaq_g1": ("Unitree G1, 29 joints", G1, DWAQ.format("policy/g1_dwaq/policy.pt"), "--describe {clones}/" + DWAQ.format("configs/g1_dwaq_jit.yaml")),
+    "dwaq_phase_g1": ("Unitree G1, 29 joints", G1, DWAQ.format("policy/g1_dwaq_phase/policy.pt"),
+                      "--describe {clones}/" + DWAQ.format("configs/g1_dwaq_phase.yaml")),
+    "legged_lab_h1": ("Unitree H1, 19 joints", "unitree_mujoco/unitree_robots/h1/scene.xml", "LeggedLabDeploy/policy/h1/policy.pt"),
+    "liamlate_h1_2": ("Unitree H1-2, 27 joints", "unitree_mujoco/unitree_robots/h1_2/scene.xml", VELOCITY.format("liamlate", "h1_2", "policy.onnx")),
+    "liamlate_h1_2_final": ("Unitree H1-2, 27 joints", "unitree_mujoco/unitree_robots/h1_2/scene.xml",
+                            VELOCITY.format("liamlate", "h1_2", "final_policy.onnx")),
+    "tienkung_lite": ("TienKung 2 Lite", "TienKung-Lab/legged_lab/assets/tienkung2_lite/mjcf/tienkung.xml", "TienKung-Lab/Exported_policy/walk.pt"),
+    "booster_t1_23": ("Booster T1, 21 joints", "booster_assets/robots/T1/T1_23dof.xml", "booster_deploy/tasks/locomotion/models/t1_walk.pt"),
+    "felipeosmar_go2": ("Unitree Go2, unitree_rl_mjlab", GO2, VELOCITY.format("felipeosmar", "go2", "policy.onnx")),
+    "pmy9527_go2": ("Unitree Go2, unitree_rl_lab, at 1 m/s", GO2, VELOCITY.format("PMY9527", "go2", "policy.onnx"), "--speed 1"),
+    "legged_rl_deploy_go2_mjlab": ("Unitree Go2, mjlab", GO2, GO2_POLICIES.format("velocity/mjlab/polity.onnx"),
+                                   "--describe {clones}/" + GO2_POLICIES.format("velocity/mjlab/config.yaml")),
+    "legged_rl_deploy_go2_lab": ("Unitree Go2, unitree_rl_lab", GO2, GO2_POLICIES.format("velocity/unitree_rl_lab/policy.onnx"),
+                                 "--describe {clones}/" + GO2_POLICIES.format("velocity/unitree_rl_lab/config.yaml")),
+    "legged_rl_deploy_go2_trot": ("Unitree Go2, legged_gym", GO2, GO2_POLICIES.format("trot/policy.onnx"),
+                                  "--describe {clones}/" + GO2_POLICIES.format("trot/config.yaml")),
+    "deeprobotics_lite3": ("DEEP Robotics Lite3", LITE3, "Lite3_rl_deploy/policy/ppo/policy.onnx"),
+    "weihan_lite3": ("DEEP Robotics Lite3", LITE3, "weihan_lite3/policy/ppo/policy.onnx",
+                     "--describe {trial}/deeprobotics_lite3.ini --set default..*HipY_joint=-0.8 --set default..*Knee_joint=1.6"),
+    "himloco_lite3": ("DEEP Robotics Lite3, HIMLoco", LITE3, "rl_sar/policy/lite3/himloco/policy_6_11.pt",
+                      "--describe {clones}/rl_sar/policy/lite3/himloco/config.yaml"),
     "mild_g1": ("Unitree G1, 12 joints: ours", "unitree_rl_gym/resources/robots/g1_description/scene.xml", OWN + ":G1"),
     "mild_go1": ("Unitree Go1: ours", "mujoco_playground/" + PLAYGROUND.format("go1"), OWN + ":Go1"),
 }
@@ -112,7 +157,7 @@ def run(clones, out, name, options, sweep=None):
         describe = ROOT / f"examples/trial/{name}.ini"
         subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, *(["--describe", str(describe)] if describe.is_file() else []),
                         "--json", str(target), *(["--sweep", sweep] if sweep else []), *options,
-                        *(word.format(clones=clones) for words in own for word in words.split())], check=True)
+                        *(word.format(clones=clones, trial=ROOT / "examples/trial") for words in own for word in words.split())], check=True)
     return json.loads(target.read_text())
 
 

@@ -1,5 +1,5 @@
 """Descriptions that trainers write themselves, as sections of mild.describe.Description (docs/public-policies.md): the metadata of mjlab's,
-holosoma's ONNX files, Unitree's deploy.yaml, Isaac Lab's env.yaml and IO descriptors.
+holosoma's ONNX files, Unitree's deploy.yaml, Isaac Lab's env.yaml and IO descriptors, the configs of rl_sar, legged_rl_deploy and LeggedLabDeploy.
 
 What a file leaves out and a walk needs is nan or an unknown term, which Description reports, so that an ini with
 `layout = FILE` can complete it."""
@@ -58,6 +58,12 @@ def sections(path):
         return _texts(_descriptors(document))
     if "sim" in document and "observations" in document:
         return _texts(_isaac(document))
+    if "joint2motor_idx" in document:
+        return _texts(_legged_lab(document))
+    if "policy" in document and "joint_ids_map" in document["policy"]:
+        return _texts(_legged_rl_deploy(document["policy"]))
+    if len(document.value) == 1 and "rl_kp" in document.items()[0][1]:
+        return _texts(_rl_sar(document.items()[0][1]))
     raise ValueError(f"describe: {path} is no deploy.yaml of Unitree (no joint_ids_map) and no env.yaml of Isaac Lab (no sim, observations); "
                      f"{REMEDY}")
 
@@ -200,7 +206,8 @@ class Observation:
 # ---- Unitree's deploy.yaml ----
 def _deploy(document):
     """Joints have numbers: the place of a motor among those of joint_ids_map is that of a motor in the model (_stand.numbered)."""
-    ids = document["joint_ids_map"].numbers()
+    ids = document["joint_ids_map"].list()
+    ids = list(range(len(ids))) if all(one is None for one in ids) else document["joint_ids_map"].numbers()
     if len(set(ids)) < len(ids):
         raise document["joint_ids_map"].wrong("names a motor twice")
     count, places = len(ids), [sorted(ids).index(one) for one in ids]
@@ -224,8 +231,9 @@ def _deploy(document):
              "action": {"seen": "raw", "target": _target(action, [default[one] for one in moved])},
              "default": {f"@{place}": value for place, value in zip(places, default)},
              "scale": {f"@{places[one]}": value for one, value in zip(moved, scale)}, **_limits(action, [f"@{places[one]}" for one in moved])}
-    for section, key in (("kp", "stiffness"), ("kd", "damping")):  # by motor, unlike the rest
-        found[section] = {f"@{place}": value for place, value in enumerate(document[key].numbers(count))}
+    for section, key in (("kp", "stiffness"), ("kd", "damping")):  # by motor, unlike the rest; some files have rows of motors that are not there
+        gains = document[key].numbers(None if len(document[key].list()) > max(ids, default=-1) else count)
+        found[section] = {f"@{place}": gains[int(one)] if len(gains) > count else gains[place] for one, place in zip(ids, places)}
     return found | _deploy_observation(document["observations"])
 
 
@@ -297,6 +305,84 @@ def _target(action, default):
     if any(values):
         raise offset.wrong("must be 0 or the default angles")
     return "zero"
+
+
+# ---- programs that walk policies of several trainers ----
+RL_SAR = {"lin_vel": "linear_velocity", "ang_vel": "angular_velocity", "gravity_vec": "gravity", "commands": "command",
+          "dof_pos": "joint_position", "dof_vel": "joint_velocity", "actions": "action"}
+LEGGED_RL_DEPLOY = {**ISAAC, "base_ang_vel_B": "angular_velocity", "eulerZYX_rpy": "euler", "joint_pos": "joint_position", "gait_phase_2": "phase"}
+
+
+def _rl_sar(part):
+    """fan-ziqi/rl_sar's config.yaml, whose base.yaml above it names the robot's joints."""
+    robot = part.key.split("/")[0]
+    base = next((folder / "base.yaml" for folder in list(pathlib.Path(part.file).parents)[:4] if (folder / "base.yaml").is_file()), None)
+    if base is None:
+        raise part.wrong("needs the base.yaml of its robot in a folder above")
+    base = Part(_load(base), base)[robot]
+    names, moved = base["joint_names"].names(), [int(one) for one in part["joint_mapping"].numbers(part["num_of_dofs"].integer())]
+    if any(one not in range(len(names)) for one in moved):
+        raise part["joint_mapping"].wrong(f"must be numbers from 0 to {len(names) - 1}")
+    joints = [names[one] for one in moved]
+    terms, count = Observation(RL_SAR), len(joints)
+    for name in part["observations"].names():
+        key = {"commands": "commands_scale"}.get(name, f"{name}_scale")
+        terms.add(name, part[key].numbers() if isinstance(part.get(key).value, list) else [part.get(key, 1.0).number()])
+    history, default, scale = part.get("observations_history", []).numbers(), part["default_dof_pos"].numbers(count), part["action_scale"].numbers(count)
+    low, high = (part[f"actions_{end}"].numbers(count) if f"actions_{end}" in part else part[f"clip_actions_{end}"].numbers(count) for end in ("lower", "upper"))
+    even = len({-one for one in low} | set(high)) == 1
+    found = {"policy": {"joints": joints, "step": f"{base['dt'].positive():g}", "decimation": base["decimation"].integer(),
+                        "clip": part["clip_obs"].number()},
+             "observation": terms.keys, "action": {"clip": high[0]} if even else {},
+             "history": {"frames": max(1, len(history)), "newest": "first" if history[:2] == sorted(history[:2]) else "last",
+                         "stack": "term" if part.get("observations_history_priority", "time").value == "term" else "frame"},
+             "kp": dict(zip(joints, part["rl_kp"].numbers(count))), "kd": dict(zip(joints, part["rl_kd"].numbers(count))),
+             "effort": dict(zip(joints, part["torque_limits"].numbers(count))), "default": dict(zip(joints, default)), "scale": dict(zip(joints, scale))}
+    if not even:  # limits of the action, as those of the targets
+        for section, bounds in (("lower", low), ("upper", high)):
+            found[section] = {joint: pose + bound * factor for joint, pose, bound, factor in zip(joints, default, bounds, scale)}
+    return found
+
+
+def _legged_lab(document):
+    """LeggedLabDeploy's config: the standard observation of motors with numbers, whole frames, oldest first."""
+    ids = document["joint2motor_idx"].numbers()
+    count, joints = len(ids), [f"@{sorted(ids).index(one)}" for one in ids]
+    names = ["base_ang_vel", "projected_gravity", "command", "joint_pos", "joint_vel", "actions"]
+    terms, gait = Observation(MJLAB), document.get("gait_phase", {})
+    scales = {"base_ang_vel": "ang_vel_scale", "joint_pos": "dof_pos_scale", "joint_vel": "dof_vel_scale"}
+    for name in names:
+        terms.add(name, document["command_scale"].numbers() if name == "command" else [document[scales[name]].number() if name in scales else 1.0])
+    if gait.get("enable", False).value is True:
+        terms.add("phase")
+        terms.clock = {"period": gait["period"].number(), "offsets": [0, gait["offset"].number()]}
+    return {"policy": {"model_joints": count, "joints": joints, "step": f"{PHYSICS:g}", "decimation": round(document["control_dt"].positive() / PHYSICS),
+                       "clip": 100},
+            "observation": terms.keys, "clock": terms.clock, "history": {"frames": document["history_length"].integer()}, "action": {"clip": 100},
+            "kp": dict(zip(joints, document["kps"].numbers(count))), "kd": dict(zip(joints, document["kds"].numbers(count))),
+            "default": dict(zip(joints, document["default_joint_pos"].numbers(count))), "scale": {".*": document["action_scale"].number()}}
+
+
+def _legged_rl_deploy(part):
+    """Renkunzhao/legged_rl_deploy's config.yaml: as Unitree's deploy.yaml, with gains in the order of the policy."""
+    ids = part["joint_ids_map"].numbers()
+    count, joints = len(ids), [f"@{sorted(ids).index(one)}" for one in ids]
+    action, stack = _only(part["actions"], ("JointPositionAction",)), part["observations"].get("stack", {})
+    terms, clock = Observation(LEGGED_RL_DEPLOY), {}
+    for name, term in part["observations"]["terms"].items():
+        term.value = {} if term.value is None else term.value
+        scale = term.get("scale", 1.0)
+        terms.add(name, scale.numbers() if isinstance(scale.value, list) else [scale.number()])
+        if name == "gait_phase_2":
+            clock = {"period": term["params"]["cycle_time"].number()}
+    scale = action.get("scale", 1.0)
+    found = {"policy": {"model_joints": count, "joints": joints, "step": f"{PHYSICS:g}", "decimation": round(part["policy_dt"].positive() / PHYSICS)},
+             "observation": terms.keys, "clock": clock, "default": dict(zip(joints, action["offset"].numbers(count))),
+             "history": {"frames": stack.get("length", 1).integer(), "newest": "first" if stack.get("order").value == "newest_first" else "last"},
+             "scale": dict(zip(joints, scale.numbers(count) if isinstance(scale.value, list) else [scale.number()] * count)), "action": {"seen": "raw"}}
+    for section, key in (("kp", "stiffness"), ("kd", "damping")):
+        found[section] = dict(zip(joints, part[key].numbers(count)))
+    return found
 
 
 # ---- Isaac Lab's env.yaml ----

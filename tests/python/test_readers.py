@@ -56,6 +56,18 @@ actions:
   legs: {class_type: isaaclab.envs.mdp.actions.joint_actions:JointPositionAction, joint_names: [.*], scale: {.*_hip: 0.5, .*_ankle: 0.25},
          offset: 0.0, clip: {.*_hip: [-0.6, 0.7]}, preserve_order: false, use_default_offset: true}
 """
+LAB = {"control_dt": 0.02, "history_length": 10, "joint2motor_idx": [4, 9, 5, 11], "kps": [100, 90, 80, 70], "kds": [4, 3, 2, 1],
+       "default_joint_pos": [0.1, 0.2, 0.3, 0.4], "ang_vel_scale": 0.25, "dof_pos_scale": 1, "dof_vel_scale": 0.05, "action_scale": 0.5,
+       "command_scale": [2, 2, 1], "gait_phase": {"enable": True, "period": 0.6, "offset": 0.5}}
+RENKUN = {"policy_dt": 0.02, "joint_ids_map": [4, 9, 5, 11], "stiffness": [100, 90, 80, 70], "damping": [4, 3, 2, 1],
+          "actions": {"JointPositionAction": {"scale": 0.5, "offset": [0.1, 0.2, 0.3, 0.4]}},
+          "observations": {"stack": {"length": 3, "order": "newest_first"}, "terms": {"gait_phase_2": {"params": {"cycle_time": 0.5}}, "base_ang_vel_B": None,
+                                                                                   "joint_vel": {"scale": [0.05] * 4}}}}
+RL_SAR = {"biped": {"dt": 0.005, "decimation": 4, "joint_names": JOINTS}}
+CONFIG = {"biped/walk": {"num_of_dofs": 4, "joint_mapping": [2, 0, 1, 3], "observations": ["commands", "ang_vel", "dof_pos", "actions"],
+                         "observations_history": [0, 1, 2], "clip_obs": 100, "commands_scale": [2, 2, 1], "ang_vel_scale": 0.25, "dof_pos_scale": 1,
+                         "clip_actions_lower": [-9] * 4, "clip_actions_upper": [9] * 4, "rl_kp": [100, 90, 80, 70], "rl_kd": [4, 3, 2, 1],
+                         "torque_limits": [30] * 4, "default_dof_pos": [0.1, 0.2, 0.3, 0.4], "action_scale": [0.5, 0.6, 0.7, 0.8]}}
 MJLAB = {"joint_names": ",".join(JOINTS), "joint_stiffness": "10.000,11.000,12.000,13.000", "joint_damping": "1,2,3,4",
          "default_joint_pos": "0.1,0.2,0.3,0.4", "action_scale": "0.5", "observation_names": "base_ang_vel,projected_gravity,joint_pos,joint_vel,actions,command"}
 TERM = {"overloads": {"clip": None, "scale": None, "history_length": 0}}
@@ -179,6 +191,37 @@ class Yaml(Files):
             seen = observer.observe(state)
         self.assertEqual((len(seen), seen[9:18].tolist()), (54, [0, 0, 1, 0, 0, 1, 0, 0, 2]))
 
+    def test_deploy_motors(self):
+        """Rows of gains of motors that are not there; no numbers at all: the motors in their order."""
+        sparse = {**DEPLOY, "stiffness": list(range(12)), "damping": [1] * 12}
+        self.assertEqual(self.robot(Description(self.write(sparse))).kp.tolist(), [4, 9, 5, 11])
+        self.assertEqual(self.robot(Description(self.write({**DEPLOY, "joint_ids_map": [None] * 4}))).joints, JOINTS)
+
+    def test_programs(self):
+        """Gains go by the policy's joints in the configs of programs that walk policies of others, and what they see has their order."""
+        order = ["left_hip", "right_hip", "left_ankle", "right_ankle"]
+        for document, terms, history, clock in ((LAB, ["angular_velocity", "gravity", "command", "joint_position", "joint_velocity", "action",
+                                                       "phase_sin", "phase_cos"], (10, "last"), (0.6, [0, 0.5])),
+                                                ({"policy": RENKUN}, ["phase_sin", "phase_cos", "angular_velocity", "joint_velocity"], (3, "first"), (0.5, [0]))):
+            d = Description(self.write(document, "config.yaml"))
+            robot = self.robot(d)
+            self.assertEqual((robot.joints, [t.name for t in d.terms], (d.history["frames"], d.history["newest"]), (d.clock["period"], d.clock["offsets"])),
+                             (order, terms, history, clock))
+            self.assertEqual([list(values) for values in (robot.default, robot.kp, robot.kd, robot.scale)],
+                             [[0.1, 0.2, 0.3, 0.4], [100, 90, 80, 70], [4, 3, 2, 1], [0.5] * 4])
+
+    def test_rl_sar(self):
+        with self.assertRaisesRegex(ValueError, "needs the base.yaml"):
+            Description(self.write(CONFIG, "walk/config.yaml"))
+        self.write(RL_SAR, "base.yaml")
+        d = Description(self.write(CONFIG, "walk/config.yaml"))
+        robot = self.robot(d)
+        self.assertEqual((robot.joints, robot.kp.tolist(), robot.scale.tolist(), d.policy["decimation"], d.action["clip"], d.history["newest"]),
+                         (["right_hip", "left_hip", "left_ankle", "right_ankle"], [100, 90, 80, 70], [0.5, 0.6, 0.7, 0.8], 4, 9, "first"))
+        self.assertEqual([(t.name, t.scale[0]) for t in d.terms], [("command", 2), ("angular_velocity", 0.25), ("joint_position", 1), ("action", 1)])
+        uneven = self.robot(Description(self.write(change(CONFIG, ["biped/walk", "clip_actions_lower"], [-1] * 4), "walk/config.yaml")))
+        self.assertEqual(np.round(uneven.lower, 6).tolist(), [-0.4, -0.4, -0.4, -0.4])
+
     def test_isaac(self):
         """Python's tags are read and never called; joints by depth; patterns of a group of motors hold for its joints alone."""
         with unittest.mock.patch("os.system") as never:
@@ -295,7 +338,8 @@ class Yaml(Files):
         """Any value in the place of any other is read, or refused in one line."""
         env = readers._load(self.write(ENV, "env.yaml"))
         config = {"dof_names": json.dumps(JOINTS), "kp": "[1, 2, 3, 4]", "kd": "[1, 2, 3, 4]", "experiment_config": json.dumps(HOLOSOMA)}
-        readings = [(read, document, ()) for read, document in ((readers._deploy, DEPLOY), (readers._isaac, env), (readers._descriptors, IO))]
+        readings = [(read, document, ()) for read, document in ((readers._deploy, DEPLOY), (readers._isaac, env), (readers._descriptors, IO),
+                                                             (readers._legged_lab, LAB), (readers._legged_rl_deploy, RENKUN))]
         readings += [(readers._mjlab, MJLAB, (21,)), (readers._holosoma, config, (21,)),
                      (lambda part, width: readers._holosoma(readers.Part({**config, "experiment_config": json.dumps(part.value)}, "f"), width), HOLOSOMA, (21,))]
         count = 0
