@@ -4,6 +4,7 @@
     scripts/public_policies.py --list                  # what to clone, and where
     scripts/public_policies.py CLONES --out out/public # CLONES/REPOSITORY for each; a table and a JSON for each policy
     scripts/public_policies.py CLONES --out out/public --sweep stiffness,friction # S50 of each
+    scripts/public_policies.py --page                  # the table of docs/public-policies.md from its two CSV files
 
 Needs the package mild with onnxruntime and torch. A policy whose JSON is there already is not run again; a sweep goes on from it. One that
 fails is left out, and the exit status is 1; a CSV keeps the rows of what was not run."""
@@ -234,16 +235,70 @@ def run_sweeps(clones, arguments, options):
     return bool(failed)
 
 
+FOUR_LEGS = ("Go1", "Go2", "B2", "Lite3")
+
+
+def page_table():
+    """The page's table: bipeds, quadrupeds and ours, each by S50, those without one last."""
+    def rows(name):
+        with open(ROOT / "docs" / name, encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+
+    sweeps = {row["policy"]: row for row in rows("s50.csv") if row["sweep"] == "stiffness"}
+    grounds = {}
+    for row in rows("public-policies.csv"):
+        grounds.setdefault(row["policy"], {})[row["ground"]] = row
+
+    def short(text):
+        return f"{float(text):.3g}"
+
+    def stiffness(name):
+        row = sweeps.get(name)
+        if not row:
+            return 1e9, ""
+        if not row["S50"]:
+            return float(row["high"]), f"**<{short(row['high'])}**"
+        return float(row["S50"]), f"**{short(row['S50'])}** ({short(row['low'])}..{short(row['high'])})"
+
+    def upright(row):
+        return "" if not row else row["upright"] if row["trials"] == "10" else f"{row['upright']}/{row['trials']}"
+
+    def group(name):
+        return 2 if name.startswith("mild_") else int(any(robot in POLICIES[name][0] for robot in FOUR_LEGS))
+
+    lines = ["|policy|S50 [MPa/m]|rigid|m/s|soft|sand_loose|", "|---|---|---|---|---|---|"]
+    for name in sorted((name for name in grounds if name in POLICIES and name != "unitree_g1_sole"), key=lambda name: (group(name), stiffness(name)[0], name)):
+        cells = grounds[name]
+        soft = [row for ground, row in cells.items() if ground != "rigid"]
+        whole = len(soft) == 8 and all(row["trials"] == "10" for row in soft)
+        speed = cells["rigid"]["speed [m/s]"]
+        lines.append("|".join(["", name, stiffness(name)[1], upright(cells["rigid"]), f"{float(speed):.2f}" if speed else "",
+                               str(sum(int(row["upright"]) for row in soft)) if whole else "", upright(cells.get("sand_loose")), ""]))
+    return lines
+
+
+def write_page(path=ROOT / "docs/public-policies.md"):
+    """Puts the table where the page has one that begins alike."""
+    lines, table = path.read_text(encoding="utf-8").splitlines(), page_table()
+    begin = next(k for k, line in enumerate(lines) if line.replace(" ", "").startswith("|policy|"))
+    end = next(k for k in range(begin, len(lines)) if not lines[k].startswith("|"))
+    path.write_text("\n".join([*lines[:begin], *table, *lines[end:]]) + "\n", encoding="utf-8")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clones", nargs="?", type=pathlib.Path)
     parser.add_argument("--list", action="store_true", help="print what to clone")
+    parser.add_argument("--page", action="store_true", help="write the table of docs/public-policies.md from its CSV files")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/public"))
     parser.add_argument("--only", default=",".join(POLICIES), help="names, separated by commas")
     parser.add_argument("--sweep", help="of mild trial, separated by commas: S50 in the place of the nine grounds")
     parser.add_argument("--options", help="of mild trial (default --seconds 20 --speed 0.5, and --trials 10 without a sweep)")
     parser.add_argument("--csv", type=pathlib.Path, help="also write every cell, with cost, torque and sinkage")
     arguments = parser.parse_args()
+    if arguments.page:
+        write_page()
+        return 0
     if arguments.list or not arguments.clones:
         show()
         return 0
