@@ -300,6 +300,15 @@ class Script(unittest.TestCase):
             status, _ = self.run_main(out, "--only", "nobody")
             self.assertRegex(status, "^public_policies: --only: no policy is named nobody; there are")
 
+    def test_page(self):
+        """The page's table is that of its CSV files."""
+        with tempfile.TemporaryDirectory() as folder:
+            page, text = pathlib.Path(folder) / "page.md", (ROOT / "docs/public-policies.md").read_text()
+            page.write_text(text)
+            self.run_main("--list")
+            sys.modules["public_policies"].write_page(page)
+            self.assertEqual(page.read_text(), text)
+
 
 class Arena(unittest.TestCase):
     """scripts/arena.py: the page and the letters."""
