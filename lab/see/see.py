@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """How deep will the foot go? Learned for the cells ahead of a walking robot, before contact: from prints that a height scan sees, from
 what the ground looks like, and from the robot's own last steps.
 
