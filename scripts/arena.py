@@ -23,7 +23,6 @@ DOCS = ROOT / "docs"
 LOW, HIGH = 0.1, 1000.0  # [MPa/m] ends of the axis: the range of `mild trial --sweep stiffness`
 GROUNDS = {"dry_sand_loose": "loose dry sand", "dry_sand_close": "close dry sand", "moist_sand": "moist sand", "gym_mat": "gym mat", "carpet": "carpet",
            "groomed_snow": "groomed snow", "artificial_turf": "artificial turf", "rubber_tile": "rubber tile", "running_track": "running track"}
-FOUR_LEGS = ("Go1", "Go2", "B2", "Lite3")
 FILM, CURVE = "two-g1.webp", "s50.png"
 text = html.escape
 
@@ -56,7 +55,7 @@ class Policy:
 
     @property
     def legs(self):
-        return 4 if any(robot in self.robot for robot in FOUR_LEGS) else 2
+        return 4 if any(robot in self.robot for robot in public_policies.FOUR_LEGS) else 2
 
     @property
     def order(self):
