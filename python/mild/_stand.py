@@ -368,7 +368,7 @@ def _feet(spec, model, start, description):
         feet = [_body_of(model, name) for name in given]
     else:
         feet = [body for body in sorted(low) if low[body] < min(low.values()) + 0.03]
-        feet = [body for body in feet if not any(body in _parents(model, other) for other in feet)]
+        feet = [body for body in feet if not any(body in parents(model, other) for other in feet)]
     names, soles, outlines = [], [], []
     for k, body in enumerate(feet):
         if body not in shapes:
@@ -400,7 +400,7 @@ def _body_of(model, name):
     return body if body >= 0 else int(model.site_bodyid[site])
 
 
-def _parents(model, body):
+def parents(model, body):
     found = []
     while body:
         body = int(model.body_parentid[body])

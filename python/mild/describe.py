@@ -88,6 +88,13 @@ KEYS = {
         "kind": Key(choice("torque", "servo", "model"), "torque", "torque: kp (target - q) - kd qd at every step of physics; servo: "
                     "MuJoCo's position actuators with kp and kd; model: the model's own actuators get the targets"),
     },
+    "command": {  # of a tour
+        "forward": Key(numbers, [-0.4, 0.8], "[m/s] least and largest that a tour gives; 0 between"),
+        "sideways": Key(float, 0.4, "[m/s] largest, either way"),
+        "turn": Key(float, 0.8, "[rad/s] largest, either way"),
+        "arms": Key(choice("seen", "unseen"), "seen", "what a policy sees of arms that a tour moves: their angles and speeds, or still arms "
+                    "where it wants them, their default angles if it does not move them"),
+    },
     "start": {
         "keyframe": Key(str, "", "of the model; without: the default angles"),
         "lift": Key(float, 0.0, "[m] of the feet above where they carry the robot"),
@@ -178,6 +185,8 @@ class Description:
             raise ValueError(f"{self.name}: policy.decimation must be 1 or more, history.frames 0 or more")
         if not 0 <= self.policy["step"] < math.inf:
             raise ValueError(f"{self.name}: policy.step must be 0 or more")
+        if len(self.command["forward"]) != 2 or not self.command["forward"][0] <= 0 <= self.command["forward"][1]:
+            raise ValueError(f"{self.name}: command.forward must be two numbers, the least and the largest, and 0 between")
         if not self.clock["period"] > 0:
             raise ValueError(f"{self.name}: the observation has a clock whose period it does not say; give clock.period [s], such as "
                              "--set clock.period=0.8, or the deploy.yaml that has it")

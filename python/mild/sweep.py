@@ -266,7 +266,7 @@ def _of_description(description):
     """sha256 of what a description says, from wherever."""
     tables = {table: [(pattern.pattern, value) for pattern, value in getattr(description, table)] for table in TABLES}
     terms = [(term.name, term.scale.tolist(), term.count) for term in description.terms]
-    return _sha256(json.dumps([{section: getattr(description, section) for section in KEYS}, tables, terms]).encode())
+    return _sha256(json.dumps([{section: getattr(description, section) for section in KEYS if section != "command"}, tables, terms]).encode())
 
 
 def _recorded(path, about):

@@ -26,6 +26,7 @@ GROUNDS = ("rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "
 TILT = 1.0  # [rad] a base that leans more has fallen
 LOW = 0.4  # a base that is less than this part of its height at the start above the ground and above its lowest sole has fallen
 STANDS = 0.25  # who walks at less than this part of the command stands
+SPEED, SECONDS = 0.5, 10.0  # [m/s], [s] of a trial for which nobody says
 SETTLE, LEAST = 2.0, 2.5  # [s] speed and cost count after the first, of walks longer than the second; as in mild eval
 
 
@@ -81,13 +82,17 @@ class Table:
         rows = [{"ground": row.ground, "command": list(row.command), "trials": len(row.walks), "upright": row.upright,
                  "speed": row.mean("speed"), "sideways": row.mean("sideways"), "cost": row.mean("cost"), "torque": row.torque,
                  "sinkage": row.mean("sinkage"), "falls": list(row.falls),
-                 "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
+                 **self.more(row), "each": [dataclasses.asdict(walk) for walk in row.walks]} for row in self.rows]
         return {**self.about, "rows": rows}
 
+    def more(self, row: Row) -> dict:
+        """What a row has of a tour alone."""
+        return _tour().row(row) if self.about.get("course") == "tour" else {}
+
     def remarks(self) -> list[str]:
-        """What its rows on rigid ground say against the description, as lines."""
+        """What its rows on rigid ground say against the description, as lines; of a tour nothing."""
         lines = []
-        for row in self.rows:
+        for row in [] if self.about.get("course") else self.rows:
             speed, wanted = row.mean("speed"), row.command[0]
             if row.ground == "rigid" and wanted and 2 * row.upright < len(row.walks):
                 lines.append(f"rigid: it falls at {wanted:g} m/s; unless it is known to, the description is wrong: compare --check with its training")
@@ -96,27 +101,35 @@ class Table:
         return lines
 
     def __str__(self) -> str:
+        if self.about.get("course") == "tour":
+            return _tour().text(self)
         lines = [f"{'ground':<12}{'command':>8}{'upright':>10}{'speed':>8}{'cost':>7}{'torque':>8}{'sinkage':>9}  falls after"]
         for row in self.rows:
             falls = f"{row.falls[0]:.1f} to {row.falls[1]:.1f} s" if row.falls else ""
             sinkage = row.mean("sinkage")
-            upright, sinkage = f"{row.upright} of {len(row.walks)}", _text(None if sinkage is None else 1e3 * sinkage, 0)
-            lines.append(f"{row.ground:<12}{row.command[0]:>8.2f}{upright:>10}{_text(row.mean('speed'), 2):>8}"
-                         f"{_text(row.mean('cost'), 2):>7}{row.torque:>8.0f}{sinkage:>9}  {falls}")
+            upright, sinkage = f"{row.upright} of {len(row.walks)}", text(None if sinkage is None else 1e3 * sinkage, 0)
+            lines.append(f"{row.ground:<12}{row.command[0]:>8.2f}{upright:>10}{text(row.mean('speed'), 2):>8}"
+                         f"{text(row.mean('cost'), 2):>7}{row.torque:>8.0f}{sinkage:>9}  {falls}")
         lines.append("m/s, cost of transport, N m (largest), mm (mean over stances of the deepest element); speed and cost of those upright")
         return "\n".join(line.rstrip() for line in lines)
 
 
-def _text(value, digits):
+def _tour():
+    from . import tour
+
+    return tour
+
+
+def text(value, digits):
     return "-" if value is None else f"{value:.{digits}f}"
 
 
 def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike | Callable[[np.ndarray], Sequence[float]]",
-          describe: "str | os.PathLike | Mapping | Description | None" = None, *, ground: "str | Sequence[str]" = GROUNDS, speeds: Sequence[float] = (0.5,),
-          sideways: float = 0.0, turn: float = 0.0, trials: int = 10, seconds: float = 10.0, seed: int = 1, noise: float = 1.0,
+          describe: "str | os.PathLike | Mapping | Description | None" = None, *, ground: "str | Sequence[str]" = GROUNDS, speeds: Sequence[float] = (SPEED,),
+          sideways: float = 0.0, turn: float = 0.0, trials: int = 10, seconds: "float | None" = None, seed: int = 1, noise: float = 1.0,
           changes: Mapping[str, object] = types.MappingProxyType({}), attributes: Mapping[str, object] = types.MappingProxyType({}),
           video: "str | os.PathLike | None" = None, jobs: int = 1, report: "Callable[[Row], None] | None" = None,
-          grounds: "Sequence[str] | None" = None) -> "Table":
+          grounds: "Sequence[str] | None" = None, tour: bool = False) -> "Table":
     """Lets a policy walk on grounds, and returns a Table, whose text is one row for each ground and speed.
 
     model: an MJCF file, XML text, or a mujoco.MjSpec. policy: a file .onnx or .pt (TorchScript), FILE.py:NAME, or a callable that
@@ -124,9 +137,10 @@ def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike
     file (an ini, or a config of its trainer, mild.readers), a layout (mild.layouts()), a dict of sections, or a Description; None: what comes
     with the policy. ground: presets of mild.presets(), a list or a text with commas, and "rigid", which is
     MuJoCo's own floor. speeds: forward commands [m/s]. trials: of each row, which differ by seed, heading, place, joints and
-    noise; noise: times that of the description. changes: {"section.key": text} over the description. attributes: of mild.attach,
+    noise; seconds: of each, None: 10, of a tour 90; noise: times that of the description. changes: {"section.key": text} over the description. attributes: of mild.attach,
     such as ground__mu. video: a file, the first trial of each row. jobs: processes; more than one need policy, model and describe
-    as files. report: called with each Row. Raises ValueError with one line for what is wrong, RuntimeError for what is missing."""
+    as files. report: called with each Row. tour: instead of a command straight ahead, waypoints, pushes, and arms that are moved
+    (mild.tour); no speeds. Raises ValueError with one line for what is wrong, RuntimeError for what is missing."""
     describe = readers.find(policy) if describe is None else describe
     d = describe if isinstance(describe, Description) else Description(describe, changes)
     if grounds is not None:
@@ -134,23 +148,32 @@ def trial(model: "str | os.PathLike | mujoco.MjSpec", policy: "str | os.PathLike
         ground = grounds
     cells = [(one, (float(speed), float(sideways), float(turn)))
              for one in (ground.split(",") if isinstance(ground, str) else ground) for speed in speeds]
+    if seconds is None:
+        seconds = _tour().SECONDS if tour else SECONDS
     if not cells or trials < 1 or not seconds > 0:
         raise ValueError("trial: needs a ground, a speed, and more than 0 trials and seconds")
-    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), painted=bool(video))
+    if tour and (list(speeds) != [SPEED] or sideways or turn):
+        raise ValueError("tour: it steers the robot itself; no speed, sideways or turn")
+    options = dict(trials=int(trials), seconds=float(seconds), seed=int(seed), noise=float(noise), attributes=dict(attributes), painted=bool(video),
+                   tour=bool(tour))
     if jobs > 1 and not video:
         rows, about = _rows_of_processes((str(model), str(policy), str(describe), dict(changes), options), cells, jobs, report)
     else:
         network, rows, about = networks.load(policy, d), [], None
         with _film(video) as film:
             for ground, command in cells:
-                walker = Walker(model, network, d, ground, options)
+                walker = _walker(options)(model, network, d, ground, options)
                 rows.append(Row(ground, command, [walker.walk(command, seed + k, film if k == 0 else None) for k in range(trials)]))
                 about = about or walker.about()
                 if report:
                     report(rows[-1])
     about = {"version": _version(), "model": _place(model), "policy": _place(policy), "describe": str(d.name), **about,
-             "seconds": options["seconds"], "seed": options["seed"], "noise": options["noise"]}
+             "seconds": options["seconds"], "seed": options["seed"], "noise": options["noise"], **({"course": "tour"} if tour else {})}
     return Table(about, rows)
+
+
+def _walker(options):
+    return _tour().Tour if options["tour"] else Walker
 
 
 def _version():
@@ -173,7 +196,7 @@ def _cell(arguments):
     _quietly()
     (model, policy, describe, changes, options), ground, command = arguments
     d = Description(describe, changes)
-    walker = Walker(model, networks.load(policy, d), d, ground, options)
+    walker = _walker(options)(model, networks.load(policy, d), d, ground, options)
     row = Row(ground, command, [walker.walk(command, options["seed"] + k) for k in range(options["trials"])])
     return row, walker.about()
 
@@ -269,10 +292,14 @@ class Walker:
     def draw(self, amplitude, count):
         return self.options["noise"] * amplitude * self.random.uniform(-1, 1, count)
 
+    def read(self):
+        """What the policy may know of now."""
+        self.state.read(self.draw)
+
     def decide(self):
         """Asks the policy; the targets [rad] of all joints."""
         r, s, action = self.robot, self.state, self.description.action
-        s.read(self.draw)
+        self.read()
         raw = self.network.act(self.observer.observe(s))
         if len(raw) != len(r.joints):
             raise ValueError(f"policy: it answers {len(raw)} numbers, and moves {len(r.joints)} joints: {', '.join(r.joints)}")
@@ -471,7 +498,8 @@ EXAMPLES = """examples:
   mild trial robot.xml policy.onnx --check
   mild trial robot.xml policy.pt --describe unitree_rl_gym --set policy.decimation=4 --ground rigid,grass
   mild trial robot.xml mine.py:Policy --describe mine.ini --speed 0.3,0.6 --attach ground.mu=0.5 --video walk.mp4
-  mild trial robot.xml policy.onnx --describe mine.ini --sweep stiffness --json s50.json --plot s50.png"""
+  mild trial robot.xml policy.onnx --describe mine.ini --sweep stiffness --json s50.json --plot s50.png
+  mild trial robot.xml policy.onnx --tour --ground rigid,gym_mat --jobs 2"""
 
 
 def parser():
@@ -482,11 +510,12 @@ def parser():
     p.add_argument("--describe", metavar="FILE|LAYOUT", help="what it sees and does: an ini, a config of its trainer (deploy.yaml, env.yaml, ONNX "
                    f"metadata), or a layout: {', '.join(layouts())}; without: what comes with the policy")
     p.add_argument("--ground", type=_list(str), default=list(GROUNDS), metavar="NAME[,NAME]", help="rigid (MuJoCo's own floor) and presets (default: nine)")
-    p.add_argument("--speed", type=_list(float), default=[0.5], metavar="V[,V]", help="[m/s] forward (default 0.5)")
+    p.add_argument("--speed", type=_list(float), default=[SPEED], metavar="V[,V]", help="[m/s] forward (default 0.5)")
     p.add_argument("--sideways", type=float, default=0.0, metavar="V", help="[m/s] to the left")
     p.add_argument("--turn", type=float, default=0.0, metavar="W", help="[rad/s] to the left")
     p.add_argument("--trials", type=int, metavar="N", help="of each row (default 10); of a sweep, at most (default 60)")
-    p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="of a trial (default 10)")
+    p.add_argument("--seconds", type=float, metavar="S", help="of a trial (default 10, of a tour 90)")
+    p.add_argument("--tour", action="store_true", help="a tour instead: waypoints, pushes, and arms that are moved, as rhoyn/teleop-walking-benchmark does")
     p.add_argument("--seed", type=int, default=1, metavar="N", help="of the first trial of each row (default 1)")
     p.add_argument("--noise", type=float, default=1.0, metavar="X", help="times the noise of the description; 0: none (default 1)")
     p.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1); the results do not depend on it")
@@ -569,12 +598,16 @@ def main(argv=None):
         if arguments.sweep:
             from . import sweep
 
+            if arguments.tour:
+                raise ValueError("tour: a sweep walks straight ahead; name one of the two")
+            arguments.seconds = SECONDS if arguments.seconds is None else arguments.seconds
+
             sweep.run(arguments, changes, attributes)
             return 0
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, ground=arguments.ground, speeds=arguments.speed,
                       sideways=arguments.sideways, turn=arguments.turn, trials=10 if arguments.trials is None else arguments.trials, seconds=arguments.seconds, seed=arguments.seed,
-                      noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs)
+                      noise=arguments.noise, changes=changes, attributes=attributes, video=arguments.video, jobs=arguments.jobs, tour=arguments.tour)
         print(table, file=out)
         for line in filter(None, (table.about["remark"], *table.remarks())):
             print(line, file=out)

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 import mild
-from mild import _stand, networks, trials
+from mild import _stand, networks, tour, trials
 from mild.describe import FOLDER, Description, Observer, State, by_joint, choose, numbers
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -597,6 +597,82 @@ class Trials(unittest.TestCase):
         self.assertAlmostEqual(row.mean("sinkage"), wanted["penetration"], delta=0.05 * wanted["penetration"])
 
 
+class Tours(unittest.TestCase):
+    ARM = """<body name="{0}_arm" pos="0 {1} 0.1"><joint name="{0}_shoulder" axis="{2} 0 0" range="-2 2"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0.15 0 -0.15" mass="0.05"/>
+      <body name="{0}_fore" pos="0.15 0 -0.15"><joint name="{0}_elbow" axis="0 1 0" range="-0.5 2"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 0" mass="0.02"/></body></body>"""
+
+    def tour(self, arms="seen", policy=still):
+        """The biped with two arms that the policy does not move."""
+        text = biped().replace('<body name="left_leg"', self.ARM.format("left", 0.15, 1) + self.ARM.format("right", -0.15, -1)
+                                                      + '<body name="left_leg"')
+        describe = stander(policy={"step": 0.002, "decimation": 5, "joints": ".*hip .*ankle", "observed": ".*"}, command={"arms": arms})
+        return tour.Tour(text, networks.Callable(policy), Description(describe), "rigid", {"noise": 0.0, "attributes": {}, "seconds": 10.0})
+
+    def test_arms(self):
+        """Arms are moved as in a mirror, before the shoulders; the policy sees what they do, or nothing of it."""
+        for arms in ("seen", "unseen"):
+            seen, moved = [], []
+            walker = self.tour(arms, lambda o: seen.append(o[3:11]) or moved.append(walker.data.qpos[7:].copy()) or np.zeros(4))
+            names = [walker.robot.model.joint(j).name for j in range(1, 9)]
+            self.assertEqual([walker.robot.held[k - 4] for k in walker.arms], ["left_shoulder", "left_elbow", "right_shoulder", "right_elbow"])
+            self.assertEqual(walker.pairs, [(0, 2, 1.0), (1, 3, 1.0)])  # the right shoulder's axis points back
+            with unittest.mock.patch.object(tour, "PUSH", 0.0):
+                self.assertEqual(walker.walk((0, 0, 0), 3).end, "time")
+            angle = {name: np.array(moved)[:, k] for k, name in enumerate(names)}
+            for joint in ("shoulder", "elbow"):
+                self.assertGreater(angle[f"left_{joint}"].std(), 0.1)
+                np.testing.assert_allclose(angle[f"left_{joint}"], angle[f"right_{joint}"], atol=0.05)
+                self.assertEqual(np.abs(np.array(seen)[:, names.index(f"left_{joint}")]).max() > 0.1, arms == "seen")
+            hands = np.array([walker.hands([one[names.index(walker.robot.held[k - 4])] for k in walker.arms]) for one in moved])
+            self.assertTrue((hands[..., 0] > walker.bounds[0] - 0.03).all() and (hands[..., 1] < walker.bounds[1] + 0.03).all())
+
+    def test_pushes(self):
+        """One every 5 s for 0.08 s, as strong as its time and the robot's mass allow, at the joint's place; each seed has its own."""
+        walker, pushes = self.tour(), []
+        with unittest.mock.patch.object(tour.Tour, "wander", lambda self, start: start):
+            for seed in range(40):
+                walker.begin((0, 0, 0), seed)
+                for time in np.arange(0.01, 10, 0.02):
+                    walker.data.time = time
+                    walker.drive(walker.target)
+                    force = walker.data.xfrc_applied[:, :3]
+                    pushes += [(time, np.linalg.norm(force.sum(axis=0)))] * bool(force.any())
+        time, force = np.array(pushes).T
+        np.testing.assert_allclose(time, np.tile([0.11, 0.13, 0.15, 0.17, 5.11, 5.13, 5.15, 5.17], 40))
+        limit = 14.24 * walker.robot.mass / 3 * np.where(time < 5, 1, 1 + 2 * 5 / 60)
+        self.assertTrue(((0.5 * limit < force) & (force < limit)).all())
+        self.assertEqual(len(np.unique(force.round(9))), 80)
+        for joint in range(len(walker.joints)):  # the torque is that of the force at the joint
+            walker.pushed[0], walker.data.time = joint, 0.11
+            walker.drive(walker.target)
+            body = walker.robot.model.jnt_bodyid[walker.joints[joint]]
+            self.assertEqual(np.flatnonzero(walker.data.xfrc_applied.any(axis=1)).tolist(), [body])
+            arm = walker.data.xanchor[walker.joints[joint]] - walker.data.xipos[body]
+            np.testing.assert_allclose(walker.data.xfrc_applied[body, 3:], np.cross(arm, walker.pushes[0]), atol=1e-9)
+
+    def test_command(self):
+        """It leads to the waypoint, in the axes of the robot, within the limits, and stops where both place and heading are reached."""
+        walker = self.tour()
+        walker.begin((0, 0, 0), 5)
+        x, y, heading = walker.waypoints[0]
+        self.assertLessEqual(math.hypot(x - 0.3, y), 1)
+        place = walker.data.qpos
+        for away, turned, wanted in (((-0.2, 0), 0, (0.3, 0, 0)), ((0, -0.2), 0, (0, 0.3, 0)), ((-3, 0), 0.2, (0.8, 0, -0.3)), ((2, 0), 1.0, (-0.4, 0, -0.8)),
+                                     ((0.15, 0), 0, (-0.225, 0, 0)), ((0.05, 0), 0, (0, 0, 0)), ((0.15, 0), 0.1, (0, 0, 0)), ((0.25, 0), 0.15, (-0.375, 0, -0.225))):
+            c, s = math.cos(heading + turned), math.sin(heading + turned)  # away: in the axes of the robot
+            place[:2] = x + c * away[0] - s * away[1], y + s * away[0] + c * away[1]
+            place[3:7] = math.cos((heading + turned) / 2), 0, 0, math.sin((heading + turned) / 2)
+            walker.steer()
+            np.testing.assert_allclose(walker.state.command, wanted, atol=1e-9, err_msg=str(away))
+        self.assertEqual(walker.reached, {0})
+        walker.data.time = 5.0
+        walker.steer()
+        self.assertEqual((walker.number, len(walker.left)), (1, 1))
+        self.assertAlmostEqual(walker.left[0], 0.25)
+
+
 class Remarks(unittest.TestCase):
     def test_rigid(self):
         """Falls and standing on rigid ground are said; a command of 0, and other grounds, are not."""
@@ -629,6 +705,9 @@ class Command(unittest.TestCase):
                 self.assertEqual((status, error, out.count("2 of 2")), (0, "", 2))
             self.assertEqual((folder / "1.json").read_text(), (folder / "2.json").read_text())
             subprocess.run([sys.executable, ROOT / "tests/app/schema.py", ROOT / "docs/schema/trial.json", folder / "1.json"], check=True)
+            status, out, _ = self.run_main(model, policy, *describe, *short, "--tour", "--json", folder / "tour.json")
+            self.assertRegex(out, r"rigid +0.2 +2 of 2 +0.0")
+            subprocess.run([sys.executable, ROOT / "tests/app/schema.py", ROOT / "docs/schema/trial.json", folder / "tour.json"], check=True)
             status, out, _ = self.run_main(model, policy, *describe, "--check")
             self.assertEqual(status, 0)
             for wanted in ("feet left_foot right_foot", "3 numbers", "kp 400", "action 0.000"):
@@ -637,7 +716,9 @@ class Command(unittest.TestCase):
             self.assertIn("[actuator]", out)
             for arguments, line in (((model,), "needs MODEL and POLICY"), ((model, policy), "needs --describe"), ((model, policy, "--describe", "nobody"), "no file 'nobody'"),
                                     ((model, policy, *describe, "--set", "a"), "KEY=VALUE"), ((model, policy, *describe, "--set", "policy.x=1"), "no key 'x'"),
-                                    ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--ground", "soup"), "soup"),
+                                    ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--tour", "--turn", "1"), "steers"),
+                                    ((model, policy, *describe, "--tour", "--sweep", "friction"), "one of the two"), ((model, policy, *describe, "--set", "command.forward=1 2"), "0 between"),
+                                    ((model, policy, *describe, "--ground", "soup"), "soup"),
                                     ((folder / "no.xml", policy, *describe), "no file"), ((folder / "bad.xml", policy, *describe), "bodies"),
                                     ((model, policy, *describe, "--set", "observation.sensor:ear=1"), "sensor:ear: the model has no such"), ((model, "no.onnx", *describe), "no file")):
                 status, _, error = self.run_main(*arguments)
