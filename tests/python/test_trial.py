@@ -598,7 +598,7 @@ class Trials(unittest.TestCase):
 
 
 class Tours(unittest.TestCase):
-    ARM = """<body name="{0}_arm" pos="0 {1} 0.1"><joint name="{0}_shoulder" axis="{2} 0 0" range="-2 2"/>
+    ARM = """<body name="{0}_arm" pos="0 {1} 0.1"><joint name="{0}_shoulder" axis="1 {2} 0" range="-2 2"/>
       <geom type="capsule" size="0.02" fromto="0 0 0 0.15 0 -0.15" mass="0.05"/>
       <body name="{0}_fore" pos="0.15 0 -0.15"><joint name="{0}_elbow" axis="0 1 0" range="-0.5 2"/>
         <geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 0" mass="0.02"/></body></body>"""
@@ -617,16 +617,18 @@ class Tours(unittest.TestCase):
             walker = self.tour(arms, lambda o: seen.append(o[3:11]) or moved.append(walker.data.qpos[7:].copy()) or np.zeros(4))
             names = [walker.robot.model.joint(j).name for j in range(1, 9)]
             self.assertEqual([walker.robot.held[k - 4] for k in walker.arms], ["left_shoulder", "left_elbow", "right_shoulder", "right_elbow"])
-            self.assertEqual(walker.pairs, [(0, 2, 1.0), (1, 3, 1.0)])  # the right shoulder's axis points back
+            self.assertEqual(walker.pairs, [(0, 2, -1.0), (1, 3, 1.0)])  # the right shoulder's axis points back
             with unittest.mock.patch.object(tour, "PUSH", 0.0):
                 self.assertEqual(walker.walk((0, 0, 0), 3).end, "time")
             angle = {name: np.array(moved)[:, k] for k, name in enumerate(names)}
-            for joint in ("shoulder", "elbow"):
+            for joint, sign in (("shoulder", -1), ("elbow", 1)):
                 self.assertGreater(angle[f"left_{joint}"].std(), 0.1)
-                np.testing.assert_allclose(angle[f"left_{joint}"], angle[f"right_{joint}"], atol=0.05)
+                np.testing.assert_allclose(angle[f"left_{joint}"], sign * angle[f"right_{joint}"], atol=0.05)
                 self.assertEqual(np.abs(np.array(seen)[:, names.index(f"left_{joint}")]).max() > 0.1, arms == "seen")
-            hands = np.array([walker.hands([one[names.index(walker.robot.held[k - 4])] for k in walker.arms]) for one in moved])
-            self.assertTrue((hands[..., 0] > walker.bounds[0] - 0.03).all() and (hands[..., 1] < walker.bounds[1] + 0.03).all())
+            angles = walker.angles[0]
+            for _ in range(100):
+                angles = walker.wander(angles)
+                self.assertTrue((walker.hands(angles)[:, 0] >= walker.bounds[0]).all() and (walker.hands(angles)[:, 1] <= walker.bounds[1]).all())
 
     def test_pushes(self):
         """One every 5 s for 0.08 s, as strong as its time and the robot's mass allow, at the joint's place; each seed has its own."""
