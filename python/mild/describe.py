@@ -365,6 +365,7 @@ class State:
         self.description, self.model, self.data, self.at, (self.qpos, self.qvel) = description, model, data, frame, seen
         self.command, self.action, self.default = np.zeros(3), None, None
         self.twist, self.rotation = np.zeros(6), np.eye(3)
+        self.then, self.turns = 0.0, 0.0  # [s] and periods of the clock, whose period may change with the command
 
     def read(self, draw):
         """Reads the state; draw(amplitude, count): noise."""
@@ -408,5 +409,9 @@ class State:
         if np.linalg.norm(self.command) < clock["standing"]:
             phase = clock["standing_phase"]
             return np.zeros(len(offsets)) if phase is None else np.full(len(offsets), function(2 * np.pi * phase))
-        slow = max(0.0, 1 - np.abs(self.command) @ [1, 3, 1] / clock["slow_below"])  # a trial has one command
-        return function(2 * np.pi * (self.data.time / (clock["period"] * (1 + clock["slowing"] * slow)) + offsets))
+        time, slow = self.data.time, max(0.0, 1 - np.abs(self.command) @ [1, 3, 1] / clock["slow_below"])
+        period = clock["period"] * (1 + clock["slowing"] * slow)
+        if time < self.then:  # another walk
+            self.then = self.turns = 0.0
+        self.turns, self.then = self.turns + (time - self.then) / period, time
+        return function(2 * np.pi * ((self.turns if clock["slowing"] else time / period) + offsets))

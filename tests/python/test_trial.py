@@ -196,10 +196,15 @@ class Observations(unittest.TestCase):
             np.testing.assert_allclose(seen, wanted, atol=1e-6)
 
     def test_slow_clock(self):
-        """The command counts 0.5 + 3 0.1 + 0.2 = 1 m/s, four fifths of slow_below: the period is longer by a fifth of slowing."""
+        """The command counts 0.5 + 3 0.1 + 0.2 = 1 m/s, four fifths of slow_below: the period is longer by a fifth of slowing. Where the command
+        changes, the clock goes on from where it is."""
         self.data.time = 0.3
         seen = self.observe(stander(observation={"phase_sin": 1}, clock={"period": 0.5, "slowing": 0.5, "slow_below": 1.25}))[0]
         np.testing.assert_allclose(seen, [math.sin(2 * math.pi * 0.3 / (0.5 * 1.1))], atol=1e-6)
+        state = State(Description(stander(observation={"phase_sin": 1}, clock={"period": 0.5, "slowing": 1, "slow_below": 1})), self.model, self.data, None, (0, 0))
+        for time, speed, turns in ((0.25, 1.0, 0.5), (0.5, 0.0, 0.75), (0.75, 1.0, 1.25), (0.1, 1.0, 0.2)):
+            self.data.time, state.command = time, np.array([speed, 0, 0])
+            np.testing.assert_allclose(state.clock(np.sin), [math.sin(2 * math.pi * turns)], atol=1e-9)
 
     def test_scales(self):
         """One for each number, a clip, and a scale that does not fit."""
