@@ -11,8 +11,8 @@ static const struct {
              {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0},
              {"shells_share", 1}, {"slip_share", 0}};
 
-/* Those keys have no effect, all others their defaults: noise, latencies and the start are
- * drawn. */
+/* Those keys, the helping hand and driven joints have no effect, all others their defaults: noise,
+ * latencies and the start are drawn. */
 TEST(nominal) {
     TaskDef plain = task_def_default();
     TaskDef def = plain;
@@ -44,6 +44,8 @@ TEST(nominal) {
     assert_memory_equal(&def.reward, &plain.reward, sizeof def.reward);
     assert_int_equal(def.assist, 0);
     def.assist = plain.assist;
+    expect_near("driven_share", def.driven_share, 0, 0);
+    def.driven_share = plain.driven_share;
     def.randomize = plain.randomize;
     assert_memory_equal(&def, &plain, sizeof def);
 }
