@@ -12,9 +12,9 @@
 #define ENVS_BLOCKS (ENGINE_FIXED ? 3 : 1) /* blocks of a multiprocessor, at least */
 #endif
 #ifndef ENVS_WARPS
-/* Robots of a block, eight, or as many as leave room for ENVS_BLOCKS blocks in the 228 KiB of shared
- * memory of an H100, of which it takes 1 KiB a block: 5 with 29 joints. Those of a block begin
- * together and read the same instructions. */
+/* Robots of a block, eight, or as many as leave room for ENVS_BLOCKS blocks in the 228 KiB of
+ * shared memory of an H100, of which it takes 1 KiB a block: 5 with 29 joints. Those of a block
+ * begin together and read the same instructions. */
 #define ENVS_ROOM ((228 / ENVS_BLOCKS - 1) * 1024 / (int)sizeof(EnvWork))
 #define ENVS_WARPS (!ENGINE_FIXED ? 1 : ENVS_ROOM < 8 ? ENVS_ROOM : 8)
 #endif

@@ -72,7 +72,8 @@ MILD_HD_FN void task_start_driven(TaskEnv *env, const TaskDef *def, const RobotT
 /* [rad] The target of a driven joint a policy step later. It follows the goal as a critically
  * damped spring whose speed is bounded by the goal's.
  *
- *     w = clip((goal - x) / DRIVEN_APPROACH),  v' = v + (w - v) T / DRIVEN_QUICKNESS,  x' = x + v' T
+ *     w = clip((goal - x) / DRIVEN_APPROACH)
+ *     v' = v + (w - v) T / DRIVEN_QUICKNESS,  x' = x + v' T
  */
 MILD_HD_FN double driven_next(DrivenGoal goal, double x, double before) {
     const double v = (x - before) / TASK_PERIOD;
