@@ -35,7 +35,9 @@ add_library(mujoco_headers INTERFACE)
 target_include_directories(mujoco_headers INTERFACE ${mujoco_headers}/${newest})
 
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
-  add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/glibc.h>")
+  # what glibc 2.35 has a newer version of is taken in the older one, so that the wheel runs with 2.34 (Enterprise Linux 9)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/glibc.h CONTENT "__asm__(\".symver hypot, hypot@GLIBC_2.2.5\");\n")
+  add_compile_options("$<$<COMPILE_LANGUAGE:C,CXX>:SHELL:-include ${CMAKE_BINARY_DIR}/generated/glibc.h>")
 endif()
 
 set(lacking "")

@@ -9,7 +9,6 @@
 #define GRAINS_GRAINS_H
 
 #include "contact.h"
-#include "plate.h"
 
 enum : int {
     NEIGHBOURS = 30,

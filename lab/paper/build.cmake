@@ -1,5 +1,27 @@
+# DAQP (quadratic programs) from its sources: -DDAQP_ROOT= (a folder with csrc/src and csrc/include, or the same two of its
+# repository) or the sdist that `make setup` unpacks into .venv.
+set(DAQP_ROOT "" CACHE PATH "DAQP's sources; empty: those in .venv")
+if(DAQP_ROOT)
+  file(GLOB daqp_folder ${DAQP_ROOT}/csrc)
+  if(NOT daqp_folder)
+    set(daqp_folder ${DAQP_ROOT})
+  endif()
+else()
+  file(GLOB daqp_folder ${CMAKE_SOURCE_DIR}/.venv/daqp-*/csrc)
+endif()
+file(GLOB daqp_sources ${daqp_folder}/src/*.c)
+if(NOT daqp_sources)
+  message(FATAL_ERROR "DAQP not found: run `make setup` (unpacks its sources into .venv) or pass -DDAQP_ROOT=FOLDER")
+endif()
+add_library(daqp STATIC ${daqp_sources})
+target_include_directories(daqp SYSTEM PUBLIC ${daqp_folder}/include)
+target_link_libraries(daqp PUBLIC m)
+# its memory comes from the solver that it is set up for (lab/paper/control/wrench.c)
+target_compile_definitions(daqp PRIVATE malloc=wrench_take calloc=wrench_take_zeros free=wrench_give)
+target_compile_options(daqp PRIVATE -march=${MILD_MARCH} -ffp-contract=off)
+set_target_properties(daqp PROPERTIES POSITION_INDEPENDENT_CODE ON)
+
 # Controllers are found by name in layer control, so they are a part of it.
-include(${CMAKE_CURRENT_LIST_DIR}/control/Daqp.cmake)
 set(root ${CMAKE_BINARY_DIR}/layers/paper)
 file(MAKE_DIRECTORY ${root}/paper)
 file(CREATE_LINK ${CMAKE_CURRENT_LIST_DIR}/control ${root}/paper/control SYMBOLIC)

@@ -3,7 +3,7 @@
  * the part is the whole. On a device with MILD_CUDA and MILD_NCCL, else on the stand-in. */
 #include "gpu_check.h"
 
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 
 static Ranks *ranks;
 

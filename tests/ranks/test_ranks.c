@@ -3,7 +3,6 @@
 #include <float.h>
 
 #include "base/random.h"
-#include "device/ranks/device.h"
 #include "device/ranks/ranks.h"
 #include "kit.h"
 

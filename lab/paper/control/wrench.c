@@ -32,7 +32,7 @@ struct WrenchSolver {
 /* ---- memory of DAQP ---- */
 
 /* DAQP does not look at what malloc returns, and allocates only while a solver is set up. So its
- * sources are compiled with these in the place of malloc, calloc and free (Daqp.cmake), and
+ * sources are compiled with these in the place of malloc, calloc and free (build.cmake), and
  * its blocks lie within the solver, whose own allocation is checked. */
 void *wrench_take(size_t size);
 void *wrench_take_zeros(size_t count, size_t size);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 #include "device/ranks/ranks_private.h"
 
 enum { TAG_SUM, TAG_SIZE, TAG_PART };

@@ -1,11 +1,11 @@
-/* ranks/device.h by NCCL. The order of NCCL's own sums depends on the ranks' connections. So NCCL
+/* ranks/ranks.h by NCCL. The order of NCCL's own sums depends on the ranks' connections. So NCCL
  * only brings the numbers of all ranks to each of them, and a kernel adds them in our order. */
 #include <cuda_runtime.h>
 #include <nccl.h>
 #include <stdlib.h>
 
 extern "C" {
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 #include "device/ranks/ranks_private.h"
 }
 

@@ -6,7 +6,7 @@
 
 #define RANKS_BLOCK 65536 /* [bytes] that a sum sends at a time */
 
-struct RanksDevice; /* ranks/device.h */
+struct RanksDevice; /* ranks/ranks.h */
 
 struct Ranks {
     int number, count;

@@ -1,5 +1,5 @@
-/* ranks/device.h in a build without NCCL. */
-#include "device/ranks/device.h"
+/* ranks/ranks.h in a build without NCCL. */
+#include "device/ranks/ranks.h"
 
 static MildStatus refuse(const Ranks *ranks, MildError *error) {
     return ranks_count(ranks) == 1

@@ -21,7 +21,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "ground/step/derivative_free.h"
 #include "ground/step/newton_step.h"
 
 /* Steps of the differences, at fixed twists. Lengths: above the rounding of a depth, 1e-17 m beside

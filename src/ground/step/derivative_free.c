@@ -1,8 +1,6 @@
 /* By how much the impulses of a foot depend on the free motion at fixed twists. Its loop is
  * compiled as those of pass.c. */
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
-#include "ground/step/derivative_free.h"
-
 #include "ground/law/begin.h"
 #include "ground/law/impulse.h"
 #include "ground/step/step.h"

@@ -1,5 +1,5 @@
 /* Newton's method for a contact step. */
-#include "ground/step/newton_hard.h"
+#include "ground/step/newton_step.h"
 
 #define NEWTON_TOLERANCE 1e-9 /* [-] of the residual, unless the caller sets one */
 #define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */

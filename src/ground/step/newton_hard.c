@@ -1,4 +1,4 @@
-#include "ground/step/newton_hard.h"
+#include "ground/step/newton_step.h"
 
 #include "ground/law/friction.h"
 

@@ -198,4 +198,15 @@ static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, doub
     }
 }
 
+/* ---- derivative_free.c: how the law of a step depends on the free motion ---- */
+
+/* block: dP/dV^ [kg, kg m, kg m^2] of the impulses on foot f at fixed twists, in its frame. Where
+ * it stops in virgin ground, drag starts at a speed that the free motion raises (element_drag);
+ * ground that creates energy (passive = false) is explicit (element_explicit). Both are forces that
+ * follow the descent, so with g = (-slope, 1), c = g + d friction/dI_z and k = dI_z/dw of the free
+ * motion it is the sum of -k (B^T c) (B^T g)^T, as H is of h of pass.c. twist: V of the foot,
+ * world. */
+void foot_free(const FootScratch *foot, const MildContactInput *input, int f, const double *twist,
+               double block[36]);
+
 #endif

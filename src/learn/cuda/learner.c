@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 #include "learn/cuda/fused.h"
 #include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"

@@ -30,7 +30,7 @@ size_t gpu_learner_bytes(const Ppo *ppo); /* memory held on the device; 0 withou
 MildStatus gpu_learner_write(Ppo *ppo, const void *block, MildError *error);
 MildStatus gpu_learner_read(Ppo *ppo, void *block, MildError *error);
 
-/* [bytes] Largest sum over several processes (ranks/device.h), of a learner on a GPU. */
+/* [bytes] Largest sum over several processes (ranks/ranks.h), of a learner on a GPU. */
 size_t gpu_learner_sum_bytes(const Ppo *ppo);
 
 /* Writes the name of the first device as one line, or the reason why there is none. Returns whether

@@ -1,4 +1,4 @@
-#include "run/train/events.h"
+#include "run/train/log.h"
 
 #include <ini.h>
 #include <math.h>

@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "run/train/events.h"
 
 struct Log {
     FILE *csv, *events;

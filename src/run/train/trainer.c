@@ -6,7 +6,7 @@
 
 #include "base/clock.h"
 #include "base/paths.h"
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 #include "env/task/policy_keys.h"
 #include "learn/cuda/learner.h"
 #include "run/train/experiment.h"

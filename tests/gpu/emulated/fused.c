@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "cublas_v2.h"
-#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 #include "learn/cuda/fused.h"
 
 enum { ROWS = 48, COLUMNS = 40 };
@@ -57,7 +57,7 @@ int gpu_fused_backward(cudaStream_t stream, int processors, int rows, int out, i
     return 1;
 }
 
-/* ---- ranks/device.h where the device's memory is memory ---- */
+/* ---- ranks/ranks.h where the device's memory is memory ---- */
 
 MildStatus ranks_open_device(Ranks *ranks, size_t bytes, MildError *error) {
     (void)ranks, (void)bytes, (void)error;
