@@ -138,6 +138,7 @@ POLICIES = {  # name: robot, model, policy, options. Described by its ini in exa
     "himloco_lite3": ("DEEP Robotics Lite3, HIMLoco", LITE3, "rl_sar/policy/lite3/himloco/policy_6_11.pt",
                       "--describe {clones}/rl_sar/policy/lite3/himloco/config.yaml"),
     "mild_g1": ("Unitree G1, 12 joints: ours", "unitree_rl_gym/resources/robots/g1_description/scene.xml", OWN + ":G1"),
+    "mild_g1_29": ("Unitree G1, 29 joints: ours", "unitree_mujoco/unitree_robots/g1/scene_29dof.xml", OWN + ":G1_29"),
     "mild_go1": ("Unitree Go1: ours", "mujoco_playground/" + PLAYGROUND.format("go1"), OWN + ":Go1"),
 }
 

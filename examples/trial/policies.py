@@ -1,4 +1,4 @@
-"""This project's policies for `mild trial`: policies.py:G1, :Go1. They remember 41 frames, so they are callables that begin anew."""
+"""This project's policies for `mild trial`: policies.py:G1, :G1_29, :Go1. They remember 41 frames, so they are callables that begin anew."""
 import pathlib
 import sys
 
@@ -17,6 +17,10 @@ class Walker:
 
 class G1(Walker):
     file = "g1.safetensors"
+
+
+class G1_29(Walker):
+    file = "g1_29.safetensors"
 
 
 class Go1(Walker):
