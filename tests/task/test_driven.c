@@ -36,6 +36,13 @@ static double target_of(const Rig *rig, int joint) {
     return task_motor(rig->env, &rig->def, robot_table(robot), &gains, joint).target[0];
 }
 
+/* A policy step's begin, without an action. */
+static void move(Rig *rig) {
+    static const float none[ACTIONS];
+    task_begin_step(rig->env, &rig->def, robot_table(robot), none);
+    rig->env->tick++;
+}
+
 TEST(widths) {
     const TaskDef def = moving_def();
     const TaskShape shape = task_shape(&def, robot);
@@ -59,8 +66,7 @@ TEST(targets_move_within_bounds) {
         expect_near("begins there", rig.env->robot.qpos[7 + i], before[i], 1e-6);
     }
     for (int t = 0; t < SECONDS * 100; t++) {
-        task_move_driven(rig.env, &rig.def, robot_table(robot));
-        rig.env->tick++;
+        move(&rig);
         for (int i = ACTIONS; i < JOINTS; i++) {
             const double now = target_of(&rig, i), v = (now - before[i]) / TASK_PERIOD;
             assert_true(now > pose[i] + RANGE * (low[i] - pose[i]) - 1e-5);
@@ -96,8 +102,7 @@ TEST(a_share_of_episodes_moves) {
         rig_start(&rig, 0, 0, 0);
         int moves = 0;
         for (int t = 0; t < 320; t++) {
-            task_move_driven(rig.env, &rig.def, robot_table(robot));
-            rig.env->tick++;
+            move(&rig);
         }
         for (int i = ACTIONS; i < JOINTS; i++) {
             moves += target_of(&rig, i) != robot_default_pose(robot)[i];
