@@ -181,7 +181,7 @@ def make_page(folder, docs=""):
     folder.mkdir(parents=True, exist_ok=True)
     grounds, found = marks(), policies()
     measured = sorted((policy for policy in found.values() if "stiffness" in policy.sweeps), key=lambda policy: (math.isnan(policy.order), policy.order))
-    others = [policy for policy in found.values() if not policy.ours]
+    others = [policy for policy in measured if not policy.ours]
     undone = sorted(set(found) - {policy.name for policy in measured})
     entry = re.search(r"^@software\{.*?^\}", (DOCS / "cite.md").read_text(encoding="utf-8"), re.M | re.S).group()
     curve = f'<figure><img src="{CURVE}" alt="Chance to stay up by stiffness"><figcaption>A sweep: trials, the chance to stay up, S50 and its interval.</figcaption></figure>'
