@@ -12,6 +12,7 @@ import argparse
 import csv
 import json
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -150,10 +151,11 @@ def show():
 
 def run(clones, out, name, options, sweep=None):
     """The JSON of one policy."""
-    target = out / (f"{name}-{sweep}.json" if sweep else f"{name}.json")
+    target = out / (f"{name}-{sweep}.json" if sweep else f"{name}-tour.json" if "--tour" in options else f"{name}.json")
     if sweep or not target.is_file():
         _, model, policy, *own = POLICIES[name]
         policy = policy if policy.startswith("/") else str(clones / policy)
+        own = [re.sub(r"--speed \S+", "", words) for words in own] if "--tour" in options else own  # a tour has speeds of its own
         describe = ROOT / f"examples/trial/{name}.ini"
         subprocess.run([sys.executable, "-m", "mild", "trial", str(clones / model), policy, *(["--describe", str(describe)] if describe.is_file() else []),
                         "--json", str(target), *(["--sweep", sweep] if sweep else []), *options,
@@ -249,14 +251,14 @@ def page_table():
         grounds.setdefault(row["policy"], {})[row["ground"]] = row
 
     def short(text):
-        return f"{float(text):.3g}"
+        return f"{float(text):.3g}" if text else "?"
 
     def stiffness(name):
         row = sweeps.get(name)
         if not row:
             return 1e9, ""
         if not row["S50"]:
-            return float(row["high"]), f"**<{short(row['high'])}**"
+            return float(row["high"] or row["low"]), f"**<{short(row['high'])}**" if row["high"] else f"**>{short(row['low'])}**"
         return float(row["S50"]), f"**{short(row['S50'])}** ({short(row['low'])}..{short(row['high'])})"
 
     def upright(row):
@@ -307,6 +309,8 @@ def main():
         sys.exit(f"public_policies: --only: no policy is named {', '.join(unknown)}; there are {', '.join(POLICIES)}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     options = (arguments.options or f"--seconds 20 --speed 0.5{'' if arguments.sweep else ' --trials 10'}").split()
+    if "--tour" in options and arguments.csv:
+        parser.error("--csv has no columns for a tour; --out keeps its JSON")
     if arguments.sweep:
         return run_sweeps(arguments.clones, arguments, options)
     failed = []

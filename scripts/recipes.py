@@ -16,6 +16,7 @@ import os
 import pathlib
 import queue
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -50,6 +51,7 @@ def mild(*arguments, **options):
 def train(folder, name, seed, gpu):
     """Trains FOLDER/NAME-SEED.safetensors."""
     run = folder / f"{name}-{seed}"
+    shutil.rmtree(run, ignore_errors=True)  # of a training that was interrupted
     done = mild("train", "--config", ROOT / "configs/g1.ini", *SHORT, *RECIPES[name][1], f"--train.seed={seed}", "--out", run,
                 env={**os.environ, "CUDA_VISIBLE_DEVICES": gpu})
     if done.returncode:
