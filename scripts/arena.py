@@ -78,24 +78,20 @@ def digits(value):
 
 
 def bound(row):
-    """(where the bar of a sweep begins, low, high); NaN where there is no such end. never_falls has a bound above, always_falls one below."""
+    """(where the bar of a sweep begins, low, high); NaN where there is no such end. Without an S50 there is only a bound."""
     low, high, middle = number(row["low"]), number(row["high"]), number(row["S50"])
-    if row["verdict"] == "never_falls":
-        return 0.999 * high, math.nan, math.nan
-    if row["verdict"] == "always_falls":
-        return 1.001 * low, math.nan, math.nan
+    if math.isnan(middle):
+        return 1.001 * low if math.isnan(high) else 0.999 * high, math.nan, math.nan
     return middle, low, high
 
 
 def s50(row):
     """S50 with its interval, as text."""
     low, high = number(row["low"]), number(row["high"])
-    if row["verdict"] == "never_falls":
-        return f"< {digits(high)}"
-    if row["verdict"] == "always_falls":
-        return f"> {digits(low)}"
+    if not row["S50"]:
+        return f"> {digits(low)}" if math.isnan(high) else f"< {digits(high)}"
     ends = " to ".join("?" if math.isnan(end) else digits(end) for end in (low, high))
-    return f"{'-' if math.isnan(number(row['S50'])) else digits(number(row['S50']))} ({ends})"
+    return f"{digits(number(row['S50']))} ({ends})"
 
 
 def policies():

@@ -314,7 +314,7 @@ class Arena(unittest.TestCase):
     """scripts/arena.py: the page and the letters."""
 
     S50 = ("policy,sweep,unit,verdict,S50,low,high,trials,upright\nunitree_h1,stiffness,MPa/m,inside,10,8,12.5,20,10\nmild_g1,stiffness,MPa/m,open,0.2,,1,20,9\n"
-           "grove_g1,stiffness,MPa/m,never_falls,,,0.1,8,8\nno<body,stiffness,MPa/m,always_falls,,1000,,8,0\nunitree_h1,slip,mm,inside,3,2.9,3.1,20,9\n")
+           "grove_g1,stiffness,MPa/m,open,,,0.1,8,8\nno<body,stiffness,MPa/m,always_falls,,1000,,8,0\nunitree_h1,slip,mm,inside,3,2.9,3.1,20,9\n")
     TRIALS = ("policy,ground,trials,upright,speed [m/s],cost,largest torque [N m],sinkage [m],median fall [s]\n"
               "unitree_h1,rigid,10,10,0.464,0.3,1.0,0.0,\nunitree_h1,grass,10,0,,,1.0,0.1,1.57\n")
 
