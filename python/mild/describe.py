@@ -187,6 +187,9 @@ class Description:
             raise ValueError(f"{self.name}: policy.step must be 0 or more")
         if len(self.command["forward"]) != 2 or not self.command["forward"][0] <= 0 <= self.command["forward"][1]:
             raise ValueError(f"{self.name}: command.forward must be two numbers, the least and the largest, and 0 between")
+        for side in ("sideways", "turn"):
+            if not 0 <= self.command[side] < math.inf:
+                raise ValueError(f"{self.name}: command.{side} must be 0 or more")
         if not self.clock["period"] > 0:
             raise ValueError(f"{self.name}: the observation has a clock whose period it does not say; give clock.period [s], such as "
                              "--set clock.period=0.8, or the deploy.yaml that has it")

@@ -511,7 +511,7 @@ def _mjlab(about, width):
     terms = Observation(MJLAB)
     for name in about["observation_names"].names():
         terms.add(name)
-    found = {"policy": {"layout": "mjlab", "joints": moved, "observed": joints}, "observation": terms.keys,
+    found = {"policy": {"layout": "mjlab", "joints": moved, **({"observed": joints} if moved is not joints else {})}, "observation": terms.keys,
              "history": {"frames": 0, "stack": "term"}, "scale": dict(zip(moved, scale * len(moved) if len(scale) == 1 else scale))}
     for section, key in (("kp", "joint_stiffness"), ("kd", "joint_damping"), ("default", "default_joint_pos")):
         found[section] = dict(zip(joints, about[key].numbers(len(joints))))

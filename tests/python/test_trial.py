@@ -725,6 +725,7 @@ class Command(unittest.TestCase):
                                     ((model, policy, *describe, "--set", "a"), "KEY=VALUE"), ((model, policy, *describe, "--set", "policy.x=1"), "no key 'x'"),
                                     ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--tour", "--turn", "1"), "steers"),
                                     ((model, policy, *describe, "--tour", "--sweep", "friction"), "one of the two"), ((model, policy, *describe, "--set", "command.forward=1 2"), "0 between"),
+                                    ((model, policy, *describe, "--set", "command.turn=nan"), "0 or more"), ((model, policy, *describe, "--set", "command.sideways=-1"), "0 or more"),
                                     ((model, policy, *describe, "--ground", "soup"), "soup"),
                                     ((folder / "no.xml", policy, *describe), "no file"), ((folder / "bad.xml", policy, *describe), "bodies"),
                                     ((model, policy, *describe, "--set", "observation.sensor:ear=1"), "sensor:ear: the model has no such"), ((model, "no.onnx", *describe), "no file")):
