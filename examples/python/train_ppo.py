@@ -92,6 +92,7 @@ class Rollout:
         for t in reversed(range(self.steps)):
             sum_ahead = delta[t] + GAMMA * LAMBDA * sum_ahead * ~self.done[t]
             advantage[t] = sum_ahead
+        advantage.masked_fill_(~self.valid, 0)  # nothing is to be learned there
         return advantage, advantage + values[:-1]
 
 

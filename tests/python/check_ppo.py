@@ -55,6 +55,7 @@ class OneFile(unittest.TestCase):
         rollout.critic.normal_(), rollout.last_critic.normal_(), rollout.reward.normal_()
         rollout.done.copy_(torch.rand(12, 64) < 0.2)
         rollout.timeout.copy_(rollout.done & (torch.rand(12, 64) < 0.5))
+        rollout.valid[:], rollout.valid[4, 3] = True, False
         found, target = rollout.advantages(lambda numbers: numbers[..., :1])
         value, left = rollout.critic[..., 0], rollout.last_critic[..., 0]
         for e in range(0, 64, 8):
@@ -68,6 +69,7 @@ class OneFile(unittest.TestCase):
                         break
                 self.assertAlmostEqual(float(found[t, e]), float(wanted), delta=1e-5)
         torch.testing.assert_close(target, found + value[:-1])
+        self.assertEqual(float(found[4, 3]), 0)
 
     def test_learns(self):
         """From noise to what can be reached with it: a squared error of a tenth of the first."""
