@@ -94,7 +94,7 @@ MildStatus controller_make_clock(const ControllerDef *def, Controller *controlle
         return mild_fail(error, MILD_ERROR_MEMORY, "clock: out of memory");
     }
     clock->observation = task_shape(def->task, def->robot).observation;
-    clock->joints = robot_joints(def->robot);
+    clock->joints = robot_actions(def->robot);
     clock->weights = weights_read(def->policy, "mild clock", "lab/paper/rivals/train_clock.py",
                                   robot_name(def->robot), &cause);
     if (!clock->weights || clock_take(clock, &cause) != MILD_OK) {

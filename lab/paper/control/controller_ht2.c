@@ -325,7 +325,7 @@ MildStatus controller_make_ht2(const ControllerDef *def, Controller *controller,
         return mild_fail(error, MILD_ERROR_MEMORY, "ht2: out of memory");
     }
     ht2->observation = task_shape(def->task, def->robot).observation;
-    ht2->joints = robot_joints(def->robot);
+    ht2->joints = robot_actions(def->robot);
     ht2->pool = def->pool;
     ht2->weights = weights_read(def->policy, "mild ht2", "lab/paper/rivals/train_ht2.py",
                                 robot_name(def->robot), &cause);
