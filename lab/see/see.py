@@ -301,6 +301,7 @@ def sights(folder, number, turn, sole, lie=False, draw=0):
         seen, old = (log[name][grid_at(log, log["points"][..., 0], log["points"][..., 1])].mean(1) for name in ("visible", "old"))
         left = log["old_place"][log["visible"][grid_at(log, *log["old_place"].T)] > 2 * MM]
     kind, patch = strip.label(place[:, 0]) // VARIANTS, strip.patch(place[:, 0])
+    speed = Strip(number // BATCH * BATCH).speed[turn]  # a batch has the speed of its first
     scale, error, told, found = np.exp(rng.normal(0, OWN_SCALE, len(place))), rng.normal(0, OWN_NOISE, len(place)), np.zeros(len(place)), []
     for k in range(len(place)):
         when = begin[k] - LEAD
@@ -320,7 +321,7 @@ def sights(folder, number, turn, sole, lie=False, draw=0):
         case = 3 if old[k] > 2 * MM else 4 if len(known) and patch[known[0]] == patch[k] else 1 if there.any() else 2 * (kind[known] == kind[k]).any()
         others = (patch == patch[k]) & (old < 2 * MM) & (np.arange(len(place)) != k) & (begin > 2)
         found.append({"evidence": evidence, "recovery": strip.soils[strip.label(place[k, 0])].recovery, "case": case,
-                      "query": [*here, log_depth(told[k]) + 2, 4 * strip.speed[turn] - 2.5, 1, 1],
+                      "query": [*here, log_depth(told[k]) + 2, 4 * speed - 2.5, 1, 1],
                       "truth": log_depth(log["depth"][k] - seen[k]), "last": measured[known[0]] if len(known) else np.nan,
                       "after": log_depth(log["depth"][others]).mean() if others.sum() > 1 else np.nan, "x": place[k, 0], "walk": 2 * number + turn})
     return found
