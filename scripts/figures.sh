@@ -98,7 +98,7 @@ rise() {
 # The G1 runs on grass: three moments.
 run() {
     "$mild" play --robot g1 --policy policies/g1_run.safetensors --ground grass --speed 2.8 --seconds 5 --video "$work/run.mp4"
-    still "$work/run.mp4" docs/run.png "select='eq(n,90)+eq(n,93)+eq(n,94)',scale=480:-1:flags=area,tile=3x1"
+    still "$work/run.mp4" docs/run.png "select='eq(n,90)+eq(n,92)+eq(n,94)',scale=480:-1:flags=area,tile=3x1"
 }
 
 # The G1 jumps on loose sand: four moments.
