@@ -169,7 +169,7 @@ typedef struct {
     int lag_scan;                        /* [policy steps] */
     Real scan_offset;                    /* [m] error of the heights that it sees */
     double assist_level;  /* [-] level of assistance: decays while on its feet, rises with falls;
-                            persists across episodes */
+                             persists across episodes */
     double command_most;  /* [m/s or m] highest command, see task_command_adapt; persists */
     Real assist_draw;     /* [-] share of the level used in this episode, in [0.5, 1) */
     Real push[6];         /* [m/s, rad/s] last push, for the critic; decays */
