@@ -102,6 +102,10 @@ if ! short; then # numpy does what is written
     "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
     "$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
         action_scale=0.3 standing_below=0.5 clock=1 gait_slowing=0.4 gait_slow_below=0.9 || fail "other.onnx"
+    # a robot with driven joints, of which the actions are fewer than the joints
+    "$mild" eval --robot g1_29 --ground foam45 --trials 2 --seconds 1 --actions arms.csv >/dev/null || fail "eval of g1_29"
+    "$mild" export --robot g1_29 --onnx arms.onnx || fail "export --onnx of g1_29"
+    "$python" "$tests/test_onnx.py" - arms.onnx arms.csv || fail "arms.onnx"
     "$python" "$tests/estimates.py" noisy.csv latent.csv 0.5 estimates.so walk.onnx || fail "estimates of the ONNX"
     "$python" "$tests/metadata.py" "$root" walk.onnx noisy.csv walk || fail "metadata of walk.onnx"
     "$python" "$tests/test_onnx.py" --double "$root" walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"

@@ -54,13 +54,13 @@ def walk(run, trials):
 model = onnx_numpy.Model(pathlib.Path(path).read_bytes())
 width = sum(map(int, model.metadata["observation_widths"].split(",")))
 held = int(model.metadata["history_means"]) * int(model.metadata["history_stride"])
-joints = len(model.metadata["joint_names"].split(","))
+moved = len(model.metadata.get("action_joint_names", model.metadata["joint_names"]).split(","))  # the others are driven
 assert model.opset == 13
 operators = {node[0] for node in model.nodes}
 assert ("Cast" in operators) == double and ("Elu" in operators) != double
 assert model.inputs == {"obs": ["batch", width], "frames_in": ["batch", held, width]}
 assert list(model.outputs) == ["actions", "frames_out", "estimates"]
-assert model.outputs["actions"] == ["batch", joints] and model.outputs["frames_out"] == model.inputs["frames_in"]
+assert model.outputs["actions"] == ["batch", moved] and model.outputs["frames_out"] == model.inputs["frames_in"]
 if source != "-":
     keys = ("default_joint_pos", "joint_stiffness", "joint_damping", "joint_effort_limit", "joint_pos_low", "joint_pos_high")
     lists = [list(map(float, model.metadata[key].split(","))) for key in keys]

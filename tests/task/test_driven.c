@@ -151,7 +151,8 @@ TEST(actions_move_their_joints) {
 
 /* What driven joints do is not paid for. */
 TEST(rewards_are_of_own_joints) {
-    const TaskDef def = moving_def();
+    TaskDef def = moving_def();
+    def.reward.weight[REWARD_power] = -1;
     Real terms[2][TASK_REWARD_COUNT];
     Rig rig;
     rig_open(&rig, &def, 3, 0);
@@ -168,7 +169,7 @@ TEST(rewards_are_of_own_joints) {
         for (int i = 0; n > 0 && i < TASK_REWARD_COUNT; i++) {
             const int sees = i == REWARD_reference_motion || i == REWARD_default_pose ||
                              i == REWARD_torque || i == REWARD_joint_speed ||
-                             i == REWARD_joint_acceleration;
+                             i == REWARD_joint_acceleration || i == REWARD_power;
             assert_int_equal(terms[1][i] != terms[0][i], n == 2 && sees);
         }
     }

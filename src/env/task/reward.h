@@ -206,7 +206,7 @@ MILD_HD_FN Real reward_joint_acceleration(const TaskMotion *m) {
     return tile_sum(sum);
 }
 
-/* What the cost of transport counts. */
+/* As the cost of transport counts it. */
 MILD_HD_FN Real reward_power(const TaskMotion *m) {
     Real sum = 0;
     for (int i = tile_lane(); i < m->env->shape.actions; i += TILE) {
