@@ -4,10 +4,10 @@
   scripts/recipes.py runs/recipes --gpus 0,1 --seeds 10        # an H200 takes 2 min 20 s for the recipes of one seed
   scripts/recipes.py runs/recipes --report                     # the table of what is there
 
-Every recipe is configs/g1.ini, 350 updates, and what RECIPES changes. Judged at 0.5 m/s, 20 trials a cell with another seed than the
-training's: S50, the stiffness at which half of the trials of 20 s stay up, on straight springs (as `mild trial --sweep stiffness`) of
-STIFFNESS, between whose places it is interpolated; then GROUNDS. A number is the interquartile mean over the seeds with its
-90 % bootstrap interval (Agarwal et al. 2021). FOLDER keeps policies and results, and a command that is run again goes on from there."""
+Every recipe is configs/g1.ini, 350 updates, and what RECIPES changes. Judged at 0.5 m/s, 20 trials a cell: S50, the stiffness at which
+half of the trials of 20 s stay up, on straight springs (as `mild trial --sweep stiffness`) of STIFFNESS, between whose places it is
+interpolated; then GROUNDS. A number is the interquartile mean over the seeds (of fewer than four the mean) with its 90 % bootstrap interval
+(Agarwal et al. 2021). FOLDER keeps policies and results, and a command that is run again goes on from there."""
 import argparse
 import concurrent.futures
 import json
@@ -24,6 +24,12 @@ import time
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "build/python"))
+try:
+    from mild import sweep
+except ImportError as missing:
+    sys.exit(f"recipes.py: {missing}; make build")
+
 MILD = shlex.split(os.environ.get("MILD", str(ROOT / "build/mild")))
 RIGID = ["--randomize.rigid_share=1", "--randomize.preset_share=0"]
 LOW = ["--task.swing_apex=0.05", "--reward.reference_amplitude=0.25"]
@@ -38,7 +44,6 @@ RECIPES = {
 }
 SHORT = ["--train.iterations=350", "--ppo.anneal=240 350", "--train.device=cuda"]
 STIFFNESS = np.geomspace(0.1, 10, 11)  # [MPa/m]
-CELL = 0.0195**2  # [m^2] of an element for which presets give k_pen
 GROUNDS = {"rigid": [], "foam45": [], "sand_loose": [], "dry_sand_loose": [],
            "slipping sand": ["--ground.slip_length=0.0025", "--ground.grip=0.1"]}  # of sand_loose
 WALK = ["--robot", "g1", "--speed", 0.5, "--trials", 20, "--seconds", 20, "--seed", 7]
@@ -67,10 +72,9 @@ def rows(policy, *arguments):
 
 
 def spring(value):
-    """Options that make a ground a straight spring of value [MPa/m] (mild.sweep)."""
-    k = 1e6 * CELL * value
-    numbers = {"k_pen": k, "sigma_cone": min(5e6, k * math.cos(1.31) / CELL), "alpha": 1.31, "nu": 0.1, "bed_depth": 1}
-    return ["--ground", "rubber_tile", *(f"--ground.{key}={number:.9g}" for key, number in numbers.items())]
+    """Options that make a ground a straight spring of value [MPa/m]."""
+    spring = sweep.QUANTITIES["stiffness"]
+    return ["--ground", spring.ground, *(f"--ground.{key}={number:.9g}" for key, number in spring.fields(value).items())]
 
 
 def s50(shares):

@@ -3,6 +3,7 @@ import contextlib
 import copy
 import io
 import json
+import math
 import os
 import pathlib
 import re
@@ -308,6 +309,25 @@ class Script(unittest.TestCase):
             self.run_main("--list")
             sys.modules["public_policies"].write_page(page)
             self.assertEqual(page.read_text(), text)
+
+
+class Recipes(unittest.TestCase):
+    """scripts/recipes.py: what it makes of shares and seeds."""
+
+    def test_numbers(self):
+        """S50 between two places, at the ends; the mean without the outer quarters, in its interval."""
+        sys.path.insert(0, str(ROOT / "scripts"))
+        import recipes
+
+        places, count = recipes.STIFFNESS, len(recipes.STIFFNESS)
+        self.assertAlmostEqual(recipes.s50([0, 0.3, 0.7] + [1] * (count - 3)), math.sqrt(places[1] * places[2]))
+        self.assertAlmostEqual(recipes.s50([1, 0.2, 0.6] + [1] * (count - 3)), places[1] * (places[2] / places[1])**0.75)
+        self.assertEqual([recipes.s50([share] * count) for share in (1, 0)], [places[0], places[-1]])
+        self.assertIn("--ground.k_pen=190.125", recipes.spring(0.5))
+        centre, low, high = recipes.middle([100, 1, 2, 3, 4, -100, 2, 3])
+        self.assertEqual(centre, 2.5)
+        self.assertLess(low, centre)
+        self.assertLess(centre, high)
 
 
 class Arena(unittest.TestCase):
