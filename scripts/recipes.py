@@ -21,14 +21,13 @@ import subprocess
 import sys
 import time
 
-import numpy as np
-
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / "build/python"))
 try:
+    import numpy as np
     from mild import sweep
 except ImportError as missing:
-    sys.exit(f"recipes.py: {missing}; make build")
+    sys.exit(f"recipes.py: {missing}: make build, then .venv/bin/python scripts/recipes.py")
 
 MILD = shlex.split(os.environ.get("MILD", str(ROOT / "build/mild")))
 RIGID = ["--randomize.rigid_share=1", "--randomize.preset_share=0"]
