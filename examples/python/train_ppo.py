@@ -1,4 +1,5 @@
-"""Trains a walk on soft ground by PPO in plain PyTorch: everything that learns is in this file, and everything that walks is mild's.
+"""PPO in plain PyTorch for walks on soft ground: everything that learns is in this file, and everything that walks is mild's. Tried on the
+CPU alone, where a minute gives no walk.
 
     python train_ppo.py                                # on a GPU where there is one (with mildground_cuda), else on the CPU
     python train_ppo.py --device cpu --envs 256 --steps 200000 --out runs/try       # a minute or two: a try, no walk
