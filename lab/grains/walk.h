@@ -67,10 +67,12 @@ void track_spread(const Track &t, int b, const std::vector<int> &order, const T 
     for (size_t k = 0; k < order.size(); k++) {
         sorted[k] = from[order[k]];
     }
+    const T *source = sorted.data(); /* then the first tile: a GPU copies within its own memory */
     for (int tile = 0; tile < t.tiles; tile++) {
         const size_t at = (size_t)b * (size_t)t.bed.g.per + (size_t)tile * (size_t)t.per;
-        copy(one + at, sorted.data(), sorted.size());
-        copy(other + at, sorted.data(), sorted.size());
+        copy(one + at, source, sorted.size());
+        source = tile == 0 ? one + at : source;
+        copy(other + at, source, sorted.size());
     }
 }
 

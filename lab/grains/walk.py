@@ -104,7 +104,7 @@ def walk(args, folder, speed, ground, trials, robot, program=None):
         return
     folder.mkdir(parents=True, exist_ok=True)
     words = [args.mild, "eval", "--robot", robot, "--policy", args.policy, "--speed", speed, "--trials", trials, "--seconds",
-             args.seconds, "--seed", args.seed, *ground, "--task.physics_dt", args.dt, "--terrain.memory=true", "--threads", args.threads]
+             args.seconds, "--seed", args.seed, "--jump", args.jump, *ground, "--task.physics_dt", args.dt, "--terrain.memory=true", "--threads", args.threads]
     for name in ("stances", "feet", "actions", "track"):
         words += [f"--{name}", folder / f"{name}.csv"]
     if program:
@@ -117,8 +117,9 @@ def walk(args, folder, speed, ground, trials, robot, program=None):
         fail(f"{folder}: mild eval ended with {done.returncode}")
     row = json.loads((folder / "eval.json").read_text())["rows"][0]
     ends = {end: count for end, count in row["ends"].items() if count and end != "time"}
-    print(f"{folder}: {row['success']}/{row['trials']} upright {ends or ''}, {row['velocity'] or float('nan'):.3f} m/s, cost "
-          f"{row['cot'] or float('nan'):.2f}, {time.time() - begin:.0f} s", flush=True)
+    said = ", ".join(f"{name} {row[name]:.3f}" for name in ("velocity", "cot", "flight", "load_peak", "penetration", "rise", "stride")
+                     if row.get(name) is not None)
+    print(f"{folder}: {row['success']}/{row['trials']} upright {ends or ''}, {said}, {time.time() - begin:.0f} s", flush=True)
 
 
 def folder_of(args, family, speed, ground):
@@ -228,6 +229,7 @@ def main():
     parser.add_argument("--families", default="sand", type=lambda text: text.split(","), help="of " + ", ".join(BEDS))
     parser.add_argument("--speeds", default="0.3,0.6", type=lambda text: text.split(","))
     parser.add_argument("--seconds", default=10, type=float)
+    parser.add_argument("--jump", default=0, type=float, help="[m] rise of jumps; --speeds are then their mean speeds")
     parser.add_argument("--seed", default=1, type=int, help="of the trials")
     parser.add_argument("--trials", default=10, type=int, help="on models; the first is that on grains")
     parser.add_argument("--dt", type=float, help="[s] physics step of the robot; default: 0.0005, on MPM 0.0025")

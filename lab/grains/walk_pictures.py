@@ -7,14 +7,15 @@ import numpy as np
 
 import walk_manifest
 
-CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.15  # [N] [s] [s] of a stance
+CONTACT, PAUSE, SHORTEST = 5.0, 0.03, 0.1  # [N] [s] [s] of a stance
 ENDS = 0.05  # [s] at which its pressure centre is reported
 PERIOD = 0.01  # [s] of the policy: of the rows of records of before 2026-11-23; later ones have a row for each physics step
 COLOURS = {"grains": "#222222", "mild": "#1f77b4", "mild_merged": "#d62728", "bekker": "#2ca02c", "ecc_quasi_3d": "#9467bd", "newton_mpm": "#ff7f0e"}
-# What walk-0.json of a ground by another program says of its walk.
+# What walk-0.json of a ground by another program says of its walk, and what eval.json does.
 REPORTED = {"grains": ("time_s", "lost_sole_s", "seconds", "steps", "late_lists", "full_lists", "surface_m"),
         "newton_mpm": ("time_s", "lost_sole_s", "seconds", "steps", "dt_s", "particles", "step_ms", "seconds_per_simulated_second",
                        "speed_off_m_s", "parameters", "device")}
+WANTED = ("trials", "success", "ends", "seconds", "velocity", "cot", "penetration", "torque_max", "flight", "load_peak", "rise", "stride")
 SHARE = np.linspace(0, 1, 41)  # of a stance
 HEAP = 0.03  # [m] over the surface; what is higher flies
 
@@ -128,7 +129,7 @@ def write_walks(out, families, speeds, file):
                     row[name] = {key: report[key] for key in REPORTED[name]}
                 if (folder / "eval.json").exists():
                     judged = json.loads((folder / "eval.json").read_text())["rows"][0]
-                    row |= {key: judged[key] for key in ("trials", "success", "ends", "seconds", "velocity", "cot", "penetration", "torque_max")}
+                    row |= {key: judged[key] for key in WANTED if key in judged}
                 if len(row) > 3:
                     walks.append(row | walk_manifest.read(folder))
     file.write_text(json.dumps(walks, indent=1) + "\n")

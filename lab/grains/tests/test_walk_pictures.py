@@ -64,7 +64,7 @@ with tempfile.TemporaryDirectory() as name:
     stub.write_text("#!/bin/sh\nfor last; do :; done\necho '%s' >$last\n" % json.dumps({"rows": [{**ROW, "ends": {}}]}))
     stub.chmod(0o755)
     policy = SOURCE / "lab/grains" / "walk" / "sand.safetensors"
-    args = types.SimpleNamespace(mild=stub, policy=policy, seconds=1, seed=7, bed_seed=11, dt=0.0005, threads=1, robot="sa01")
+    args = types.SimpleNamespace(mild=stub, policy=policy, seconds=1, seed=7, bed_seed=11, dt=0.0005, threads=1, robot="sa01", jump=0)
     for ground, program in (("mild", None), ("grains", ["grains", "--seeds", 11])):
         folder = out / "rolling" / "0.6" / ground
         walk.walk(args, folder, "0.6", ["--ground", "grass"], 1, "sa01", program)
