@@ -1,8 +1,10 @@
-"""Searches the gait of plan.json for a robot by itself, without the planner: a cross-entropy search over bend, speed gain, period, sway, lean
-and the answers to errors, hundreds of candidates at once, each from several starts and on several grounds. Prints the best so far as JSON.
+"""The gait below a plan, and a search for its numbers in plan.json by itself, without the planner: a cross-entropy search over bend, speed
+gain, period, sway, lean and the answers to errors, hundreds of candidates at once, each from several starts and on several grounds. Prints
+the best so far as JSON.
 
     python examples/python/plan/gait.py --robot sa01 --device cuda --candidates 2048 --minutes 5"""
 import argparse
+import configparser
 import json
 import pathlib
 import sys
@@ -12,7 +14,54 @@ import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-import plan
+
+
+def robot_ini(model):
+    ini = configparser.ConfigParser(inline_comment_prefixes=";")
+    ini.read(pathlib.Path(model).with_name("robot.ini"))
+    return ini
+
+
+class Gait:
+    """Joint targets by clock and posture, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed, both
+    lean and sway (rad; sin, cos of the leg's clock, of twice it, ...; the mirrored leg the other way round) and follow the errors of
+    `posture` [rad per unit], a swing leg those of `step` besides."""
+
+    def __init__(self, ini, numbers, speed):
+        self.joints = joints = ini["joints"]["names"].split()
+        feet = [float(ini[section]["offset"]) for section in ini.sections() if section.startswith("foot.")]
+        self.scale, self.offset = float(ini["robot"]["action_scale"]), np.array(feet)
+        self.leg = np.arange(len(joints)) * len(feet) // len(joints)
+        self.swing = np.array([float(x) for x in ini["joints"]["swing"].split()])
+        mirror = [joints.index(name) < i for i, name in enumerate(ini["joints"]["mirror"].split())]
+        side = np.where(mirror, np.array(ini["joints"]["mirror_sign"].split(), float), 1)
+        self.sweep, self.lean = self.by_name(joints, numbers["sweep"]), side * self.by_name(joints, numbers["lean"])
+        self.sway = side * self.by_name(joints, numbers["sway"], [0.0] * max(map(len, numbers["sway"].values()), default=2)).T
+        self.period, self.asked, self.speed = numbers["period"], speed, speed * numbers["speed_gain"]
+        self.feedback = [self.matrix(numbers[name]) for name in ("posture", "step")]
+        self.bend = numbers["bend"] if abs(speed) >= 0.1 else 0  # below it stands: task.standing_below
+
+    @staticmethod
+    def by_name(joints, numbers, none=0.0):
+        return np.array([next((value for end, value in numbers.items() if joint.endswith(end)), none) for joint in joints])
+
+    def matrix(self, numbers):
+        """[11, joints]: what the joints' targets get of a robot's errors: see Planner.follow."""
+        return np.array([self.by_name(self.joints, numbers.get(name, {})) for name in
+                         ("vx", "vy", "wx", "wy", "wz", "", "", "", "gx", "gy", "")]) / self.scale
+
+    def actions(self, phase):
+        """[..., joints] for the clock [...], and whether the joint is of a swing leg."""
+        since = (np.asarray(phase)[..., None] - self.offset) % 1
+        swings, s = since >= 0.5, 2 * since % 1
+        bend = np.where(swings, np.sin(np.pi * s) ** 2, 0)
+        ahead = 0.5 * self.period * self.speed * np.where(swings, -0.5 * np.cos(np.pi * s), 0.5 - s)  # [m] of the foot, of the hip
+        sway = sum(self.sway[k] * (np.cos, np.sin)[k % 2 == 0](2 * np.pi * (k // 2 + 1) * since[..., self.leg]) for k in range(len(self.sway)))
+        angle = self.bend * self.swing * bend[..., self.leg] + self.sweep * ahead[..., self.leg] + sway * (self.bend > 0) + self.lean
+        return angle / self.scale, swings[..., self.leg] * (self.bend > 0)
+
+
+import plan  # noqa: E402: it needs the class above
 
 ERRORS = ("vx", "vy", "wx", "wy", "wz", "gx", "gy")
 ROWS = [0, 1, 2, 3, 4, 8, 9]  # of Gait.matrix
@@ -20,8 +69,9 @@ ROWS = [0, 1, 2, 3, 4, 8, 9]  # of Gait.matrix
 
 def places(gait):
     """(path, low, high) of the numbers that are searched; joints by the ends of their names."""
-    found = [(("bend",), 0.05, 1.2), (("speed_gain",), -0.5, 2), (("period",), 0.3, 1.0)]
-    found += [((kind, joint), -0.4, 0.4) for kind in ("sway", "lean") for joint in gait[kind]]
+    found = [(("bend",), 0.05, 2.2), (("speed_gain",), -0.5, 2), (("period",), 0.3, 1.2)]
+    found += [(("lean", joint), -0.5, 0.9) for joint in gait["lean"]]
+    found += [(("sway", joint, k), -0.5, 0.5) for joint, waves in gait["sway"].items() for k in range(len(waves))]
     for kind in ("posture", "step"):
         for error, joints in gait[kind].items():
             reach = 10 if error[0] == "g" else 1.5
@@ -87,7 +137,10 @@ class Walks:
             ahead = swings * (-0.5 * xp.cos(np.pi * s)) + (1 - swings) * (0.5 - s)
             ahead = ahead * (0.5 * c["period"] * c["speed"])[None, :, None]
             target = c["bend"][None, :, None] * up[:, :, leg] * swing + ahead[:, :, leg] * sweep + c["lean"][None]
-            target = (target + c["sway"][None] * xp.sin(2 * np.pi * phase)[:, :, None]) / base.scale
+            for k in range(len(base.sway)):
+                wave = (xp.cos, xp.sin)[k % 2 == 0](2 * np.pi * (k // 2 + 1) * since)
+                target = target + c["sway"][None, :, k] * wave[:, :, leg]
+            target = target / base.scale
             if t == 0:
                 velocity, frame = self.first.estimate[:, None, :2], self.first.frame[:, None, :9]
                 velocity, frame = velocity + zero[:, :, None], frame + zero[:, :, None]

@@ -7,14 +7,15 @@ try different plans of joint targets for half a second; the best ones are averag
 Costs are the rewards of the task (docs/task.md, section 8). Their weights, the gait and the numbers of the planner are in plan.json. On
 the CPU it needs NumPy, on a GPU PyTorch."""
 import argparse
-import configparser
 import json
 import math
 import pathlib
+import sys
 import time
 
 import numpy as np
 
+from gait import Gait, robot_ini
 from mild.envs import open_envs
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -113,52 +114,39 @@ def yaw_of(xp, qpos):
     return xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def robot_ini(model):
-    ini = configparser.ConfigParser(inline_comment_prefixes=";")
-    ini.read(pathlib.Path(model).with_name("robot.ini"))
-    return ini
+class Policy:
+    """A learned policy (docs/policy.md), whose actions plans then are offsets from."""
 
+    def __init__(self, arrays, path):
+        sys.path.append(str(HERE.parent))
+        import policy
+        tensors, self.task = policy.read(path)
+        self.xp, self.tensors = arrays.xp, {name: arrays.of(values) for name, values in tensors.items()}
+        self.keys = {f"task.{key}": value for key, value in self.task.items() if key != "velocity_scale"}
 
-class Gait:
-    """Joint targets by clock and posture, in units of the action: a swing leg bends, a standing one sweeps back at the asked speed, and
-    both follow the errors of `posture` [rad per unit], a swing leg those of `step` besides."""
+    def network(self, name, x):
+        layers = sorted(int(key.split(".")[1]) for key in self.tensors if key.startswith(name) and key.endswith("weight"))
+        for i in layers:
+            x = x @ self.tensors[f"{name}.{i}.weight"].T + self.tensors[f"{name}.{i}.bias"]
+            x = x if i == layers[-1] else self.xp.where(x > 0, x, self.xp.exp(self.xp.clip(x, None, 0)) - 1)
+        return x
 
-    def __init__(self, ini, numbers, speed):
-        self.joints = joints = ini["joints"]["names"].split()
-        feet = [float(ini[section]["offset"]) for section in ini.sections() if section.startswith("foot.")]
-        self.scale, self.offset = float(ini["robot"]["action_scale"]), np.array(feet)
-        self.leg = np.arange(len(joints)) * len(feet) // len(joints)
-        self.swing = np.array([float(x) for x in ini["joints"]["swing"].split()])
-        self.sweep, self.sway, self.lean = (self.by_name(joints, numbers[name]) for name in ("sweep", "sway", "lean"))
-        self.period, self.asked, self.speed = numbers["period"], speed, speed * numbers["speed_gain"]
-        self.feedback = [self.matrix(numbers[name]) for name in ("posture", "step")]
-        self.bend = numbers["bend"] if abs(speed) >= 0.1 else 0  # below it stands: task.standing_below
-
-    @staticmethod
-    def by_name(joints, numbers):
-        return np.array([next((value for end, value in numbers.items() if joint.endswith(end)), 0.0) for joint in joints])
-
-    def matrix(self, numbers):
-        """[11, joints]: what the joints' targets get of a robot's errors: see Planner.follow."""
-        return np.array([self.by_name(self.joints, numbers.get(name, {})) for name in
-                         ("vx", "vy", "wx", "wy", "wz", "", "", "", "gx", "gy", "")]) / self.scale
-
-    def actions(self, phase):
-        """[..., joints] for the clock [...], and whether the joint is of a swing leg."""
-        since = (np.asarray(phase)[..., None] - self.offset) % 1
-        swings, s = since >= 0.5, 2 * since % 1
-        bend = np.where(swings, np.sin(np.pi * s) ** 2, 0)
-        ahead = 0.5 * self.period * self.speed * np.where(swings, -0.5 * np.cos(np.pi * s), 0.5 - s)  # [m] of the foot, of the hip
-        sway = np.sin(2 * np.pi * np.asarray(phase))[..., None] * (self.bend > 0)
-        angle = self.bend * self.swing * bend[..., self.leg] + self.sweep * ahead[..., self.leg] + self.sway * sway + self.lean
-        return angle / self.scale, swings[..., self.leg] * (self.bend > 0)
+    def act(self, history):
+        frame, heads = history[:, -1], self.network("encoder", history.reshape(len(history), -1))
+        n = 2 * (self.tensors["actor.0.weight"].shape[1] - frame.shape[1]) - heads.shape[1]
+        seen = self.xp.concatenate([heads[:, 3:n], frame[:, -2:]], 1)
+        theta = self.network("modulation", seen[:, : self.tensors["modulation.0.weight"].shape[1]])
+        half = theta.shape[1] // 2
+        z = theta[:, :half] * heads[:, n : (n + heads.shape[1]) // 2] + theta[:, half:]
+        return self.network("actor", self.xp.concatenate([frame, heads[:, :n], z], 1))
 
 
 class Planner:
     """Plans for `trials` robots at once, from their blocks and clocks."""
 
-    def __init__(self, arrays, plant, robots, gait, numbers, own_ground):
-        self.arrays, self.plant, self.robots, self.gait, self.numbers, self.own_ground = arrays, plant, robots, gait, numbers, own_ground
+    def __init__(self, arrays, plant, robots, gait, numbers, own_ground, policy=None):
+        self.arrays, self.plant, self.robots, self.gait, self.policy = arrays, plant, robots, gait, policy
+        self.numbers, self.own_ground = numbers, own_ground
         self.trials = trials = plant.envs.envs
         self.samples, self.joints = robots.envs.envs // trials, robots.envs.actions
         self.steps, self.every = round(numbers["horizon"] / PERIOD), numbers["every"]
@@ -180,7 +168,10 @@ class Planner:
         return np.maximum(0, 1 - abs(np.minimum(at, knots - 1)[:, None] - np.arange(knots)))
 
     def follow(self, robots, action, t):
-        """An action [trials, any, joints] of step t with the gait's answer to the errors of robots: velocity, turning, tilt."""
+        """An action [trials, any, joints] of step t with the gait's answer to the errors of robots: velocity, turning, tilt;
+        or with what the policy does."""
+        if self.policy:
+            return action + self.policy.act(robots.history).reshape(self.trials, -1, self.joints)
         frame, velocity = robots.frame[:, :9], robots.estimate[:, :2] - self.wanted
         answer = (velocity @ self.feedback[:2] + frame @ self.feedback[2:]).reshape(self.trials, -1, 2 * self.joints)
         return action + answer[:, :, :self.joints] + answer[:, :, self.joints:] * self.swings[t][:, None]
@@ -225,7 +216,7 @@ class Planner:
         """Actions [every, trials, joints] of the next steps."""
         clock = phase + np.arange(self.steps)[:, None] * PERIOD / self.gait.period
         nominal, swings = self.gait.actions(clock)
-        self.nominal[:], self.swings[:] = self.arrays.of(nominal), self.arrays.of(swings)
+        self.nominal[:], self.swings[:] = self.arrays.of(nominal * (not self.policy)), self.arrays.of(swings)
         self.noise[:] = self.arrays.normal(*self.noise.shape)
         if self.run is None:
             self.blocks = blocks
@@ -240,10 +231,12 @@ def walk(given, numbers, log=print):
     robot, speed, device, believes = given.robot, given.speed, given.device, given.believes or given.ground
     arrays = Arrays(device)
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
+    policy = Policy(arrays, given.policy) if given.policy else None
+    keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
-    planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground)
+    planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground, policy)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
     yaw = yaw_of(np, start)
@@ -287,6 +280,7 @@ def main():
             ("believes", "", "the ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
             ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
             ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
+            ("policy", "", "a policy's file, whose actions take the gait's place"),
             ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
         parser.add_argument("--" + name, type=type(default), default=default, help=words)
     given = parser.parse_args()
