@@ -7,14 +7,15 @@ POSE = np.array([0, 0, -0.24, 0.48, -0.24, 0] * 2)  # [rad] default pose of SA01
 
 
 def read(path):
-    """The tensors of a policy's file by name, and the keys of the task that it was trained for."""
+    """The tensors of a policy's file by name, and the keys of the task that it was trained for, with its `robot`."""
     raw = open(path, "rb").read()
     end = 8 + int.from_bytes(raw[:8], "little")
     header = json.loads(raw[8:end])
-    task = header.pop("__metadata__").get("task")
+    about = header.pop("__metadata__")
+    task = dict(key.split(" = ") for key in about["task"].split("; ")) if about.get("task") else {}
     return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]],
                              {"F32": "<f4", "F16": "<f2"}[v["dtype"]]).astype(np.float32)
-            .reshape(v["shape"]) for k, v in header.items()}, dict(key.split(" = ") for key in task.split("; ")) if task else {}
+            .reshape(v["shape"]) for k, v in header.items()}, {**task, "robot": about.get("robot", "sa01")}
 
 
 class Policy:

@@ -1,6 +1,10 @@
 """The Gymnasium environments: Gymnasium's checkers, episodes, seeds, rewards, memory, misuse."""
+import argparse
+import json
 import os
+import pathlib
 import pickle
+import sys
 import tempfile
 import unittest
 
@@ -9,6 +13,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from mild import envs, gym
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "examples/python" / part) for part in ("", "plan")]
+import plan  # noqa: E402
+import policy  # noqa: E402
 
 SHORT = {"task.episode": 1, "task.assist": False}
 
@@ -203,6 +212,33 @@ class Fork(unittest.TestCase):
         self.assertEqual(other.block_bytes, 0)
         with self.assertRaisesRegex(RuntimeError, "reset"):
             other.save(blocks)
+
+
+class Plan(unittest.TestCase):
+    """examples/python/plan."""
+
+    def test_walks(self):
+        """A plan of few samples keeps the Go1 up, and goes forward; the policy of another robot is refused."""
+        given = argparse.Namespace(robot="go1", ground="foam45", believes="rigid", speed=0.5, seconds=0.6, samples=6, trials=2, seed=1, device="cpu",
+                                   threads=1, policy="")
+        numbers = json.loads((ROOT / "examples/python/plan/plan.json").read_text())["go1"]
+        result, path = plan.walk(given, numbers, log=None)
+        self.assertEqual((result["upright"], path.shape), (2, (60, 2, 19)))
+        self.assertTrue(all(0.1 < trial["forward"] < 0.4 for trial in result["trials"]), result)
+        given.policy = str(ROOT / "policies/g1.safetensors")
+        with self.assertRaisesRegex(SystemExit, "g1.safetensors is not a policy of go1"):
+            plan.walk(given, numbers, log=None)
+
+    def test_policy(self):
+        """Over histories of an environment the planner's policy does what the policy of one frame after the other does."""
+        path = ROOT / "policies/go1.safetensors"
+        ours, one = plan.Policy(plan.Arrays("cpu"), str(path), "go1"), policy.Policy(path)
+        robots = plan.Robots(plan.Arrays("cpu"), 1, "go1", {**plan.KEYS, **ours.keys}, "cpu", 1, 1)
+        for _ in range(60):
+            action = ours.act(np.array(robots.history))
+            np.testing.assert_allclose(action[0], one.act(np.array(robots.frame[0], float)), rtol=0, atol=2e-3)
+            robots.step(action.astype(np.float32))
+        robots.close()
 
 
 class Misuse(unittest.TestCase):

@@ -117,10 +117,12 @@ def yaw_of(xp, qpos):
 class Policy:
     """A learned policy (docs/policy.md), whose actions plans then are offsets from."""
 
-    def __init__(self, arrays, path):
+    def __init__(self, arrays, path, robot):
         sys.path.append(str(HERE.parent))
         import policy
         tensors, self.task = policy.read(path)
+        if self.task.pop("robot") != robot:
+            sys.exit(f"plan: {path} is not a policy of {robot}")
         self.xp, self.tensors = arrays.xp, {name: arrays.of(values) for name, values in tensors.items()}
         self.keys = {f"task.{key}": value for key, value in self.task.items() if key != "velocity_scale"}
 
@@ -231,7 +233,7 @@ def walk(given, numbers, log=print):
     robot, speed, device, believes = given.robot, given.speed, given.device, given.believes or given.ground
     arrays = Arrays(device)
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
-    policy = Policy(arrays, given.policy) if given.policy else None
+    policy = Policy(arrays, given.policy, robot) if given.policy else None
     keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
