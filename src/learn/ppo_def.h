@@ -25,7 +25,8 @@ typedef enum {
  * (bfloat16) significant bits, which the tensor cores multiply. Sums have 32 bits always. */
 typedef enum { PPO_MATMUL_FP32, PPO_MATMUL_TF32, PPO_MATMUL_BF16, PPO_MATMULS } PpoMatmul;
 
-/* Who moves the weights between hidden layers: Adam, as all other parameters, or Muon (muon.h). */
+/* Who moves the weights between hidden layers: Adam, as all other parameters, or Muon
+ * (optimiser.h). */
 typedef enum { PPO_OPTIMIZER_ADAM, PPO_OPTIMIZER_MUON, PPO_OPTIMIZERS } PpoOptimizer;
 extern const char *const ppo_optimizer_names[PPO_OPTIMIZERS];
 

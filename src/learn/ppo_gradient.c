@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "learn/adam.h"
 #include "learn/noise.h"
+#include "learn/optimiser.h"
 #include "learn/ppo_step.h"
 #include "learn/product.h"
 

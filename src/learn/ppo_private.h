@@ -4,7 +4,7 @@
 
 #include "base/pool.h"
 #include "device/ranks/ranks.h"
-#include "learn/muon.h"
+#include "learn/optimiser.h"
 #include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"

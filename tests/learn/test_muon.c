@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "learn/muon.h"
+#include "learn/optimiser.h"
 
 enum { MOST = 96 * 96 };
 

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "learn/adam.h"
 #include "learn/noise.h"
+#include "learn/optimiser.h"
 #include "learn/order.h"
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"

@@ -6,7 +6,7 @@
 
 #include "base/random.h"
 #include "env/actuator/private.h"
-#include "learn/adam.h"
+#include "learn/optimiser.h"
 #include "learn/product.h"
 
 #define BLOCK_TIME 1.0     /* [s] that is trained on or held out together */

@@ -1,15 +1,14 @@
 /* Passes of the learner around the networks: sampling of actions, advantages, order of the samples,
  * optimiser and counters. They are ppo.c and ppo_returns.c on the device; both share ppo_step.h,
- * ppo_batch.h, order.h and adam.h. Decisions are made on the device, so that an update needs no
- * answer from the CPU. */
+ * ppo_batch.h, order.h and optimiser.h. Decisions are made on the device, so that an update needs
+ * no answer from the CPU. */
 #ifndef MILD_GPU_UPDATE_H
 #define MILD_GPU_UPDATE_H
 
 #include <cuda_runtime_api.h>
 
-#include "learn/adam.h"
 #include "learn/cuda/kernels.h"
-#include "learn/muon.h"
+#include "learn/optimiser.h"
 #include "learn/order.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"

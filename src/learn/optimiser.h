@@ -1,7 +1,56 @@
+/* The two optimisers, for CPU (optimiser.c) and GPU (cuda/update.cu, cuda/muon.c). Written in the
+ * common subset of C17 and CUDA C++. */
+#ifndef MILD_OPTIMISER_H
+#define MILD_OPTIMISER_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "base/hd.h"
+#include "learn/network.h"
+
+/* ---- Adam (Kingma & Ba 2015) ---- */
+
+#define ADAM_BETA1 0.9
+#define ADAM_BETA2 0.999
+#define ADAM_EPSILON 1e-8f
+
+typedef struct {
+    float step_size;      /* learning rate / (1 - beta1^t) */
+    float second_scale;   /* 1 / (1 - beta2^t) */
+    float gradient_scale; /* from clipping the gradient's norm */
+} AdamStep;
+
+/* t: number of this step, from 1. */
+MILD_HD_FN AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale) {
+    AdamStep step;
+    step.step_size = (float)(learning_rate / (1.0 - pow(ADAM_BETA1, (double)t)));
+    step.second_scale = (float)(1.0 / (1.0 - pow(ADAM_BETA2, (double)t)));
+    step.gradient_scale = (float)gradient_scale;
+    return step;
+}
+
+/* m = b1 m + (1-b1) g, v = b2 v + (1-b2) g^2, p -= lr m^ / (sqrt(v^) + eps), with m^ and v^
+ * corrected for their bias towards 0. */
+MILD_HD_FN void adam_element(AdamStep step, float gradient, float *parameter, float *first,
+                             float *second) {
+    const float g = gradient * step.gradient_scale;
+    const float m = (float)ADAM_BETA1 * *first + (float)(1.0 - ADAM_BETA1) * g;
+    const float v = (float)ADAM_BETA2 * *second + (float)(1.0 - ADAM_BETA2) * g * g;
+    *first = m;
+    *second = v;
+    *parameter -= step.step_size * m / (sqrtf(v * step.second_scale) + ADAM_EPSILON);
+}
+
+/* Over a range of flat arrays. */
+void adam_apply(AdamStep step, int64_t count, const float *gradient, float *parameters,
+                float *first, float *second);
+
+/* ---- Muon ---- */
+
 /* Muon (Jordan et al. 2024, kellerjordan.github.io/posts/muon) for the weights between two hidden
  * layers, with steps as long as Adam's (Liu et al. 2025, arXiv:2502.16982, eq 4; no weight decay).
- * All other parameters stay with Adam. For CPU (muon.c) and GPU (cuda/muon.c, cuda/update.cu).
- * Written in the common subset of C17 and CUDA C++.
+ * All other parameters stay with Adam.
  *
  *     M <- mu M + G                                               momentum
  *     X <- (G + mu M) / |G + mu M|                                Nesterov's direction, length 1
@@ -12,13 +61,6 @@
  * a x + b x^3 + c x^5. Five of them take 0.0015 .. 1 to 0.68 .. 1.20. The root mean square of such
  * a matrix is 1 / sqrt(max(rows, columns)), and that of Adam's steps 0.2 to 0.4 of the rate. So one
  * learning rate, which the divergence adapts, serves both. */
-#ifndef MILD_MUON_H
-#define MILD_MUON_H
-
-#include <math.h>
-
-#include "base/hd.h"
-#include "learn/network.h"
 
 #define MUON_MOMENTUM 0.95f
 #define MUON_ITERATIONS 5

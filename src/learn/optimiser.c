@@ -1,6 +1,18 @@
-#include "learn/muon.h"
+#include "learn/optimiser.h"
 
 #include "learn/product.h"
+
+/* ---- Adam ---- */
+
+void adam_apply(AdamStep step, int64_t count, const float *restrict gradient,
+                float *restrict parameters, float *restrict first, float *restrict second) {
+#pragma omp simd
+    for (int64_t i = 0; i < count; i++) {
+        adam_element(step, gradient[i], &parameters[i], &first[i], &second[i]);
+    }
+}
+
+/* ---- Muon ---- */
 
 MuonMatrices muon_matrices(const Network *network) {
     MuonMatrices all = {0};
