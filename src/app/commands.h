@@ -23,13 +23,4 @@
 COMMAND_LIST(COMMAND_DECLARE)
 #undef COMMAND_DECLARE
 
-typedef struct {
-    const char *name;
-    int (*run)(int argc, char **argv);
-    const char *help;
-} AppCommand;
-enum { COMMANDS_MAX = 32 };
-extern const AppCommand commands[];
-extern const int command_count;
-
 #endif

@@ -14,6 +14,33 @@
 #include "learn/product.h"
 #include "robot/engine.h"
 
+#ifdef MILD_LAB
+#include "lab/commands.h"
+#else
+#define LAB_COMMANDS(X)
+#endif
+
+/* ---- the table of commands ---- */
+
+#ifndef MILD_VIEW
+int cmd_play(int argc, char **argv) {
+    (void)argc;
+    (void)argv;
+    return cli_fail_text("play", "built without drawing; configure with -DMILD_VIEW=ON");
+}
+#endif
+
+typedef struct {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *help;
+} AppCommand;
+
+#define ROW(name, help) {#name, cmd_##name, help},
+static const AppCommand commands[] = {COMMAND_LIST(ROW) LAB_COMMANDS(ROW)};
+#undef ROW
+enum { COMMANDS = sizeof commands / sizeof *commands };
+
 /* ---- plain text, whatever the names in a file hold ---- */
 
 typedef struct {
@@ -84,7 +111,7 @@ static void plain_streams(void) {
 static void print_help(FILE *file) {
     fprintf(file, "mild %s: soft ground for legged robots\n\n", build_version());
     fprintf(file, "usage: mild COMMAND [options]\n\ncommands:\n");
-    for (int i = 0; i < command_count; i++) {
+    for (int i = 0; i < COMMANDS; i++) {
         fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
     fputs("\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on "
@@ -139,8 +166,8 @@ int main(int argc, char **argv) {
         printf("mild %s\n", build_version());
         return finish(0);
     }
-    const char *names[COMMANDS_MAX];
-    for (int i = 0; i < command_count; i++) {
+    const char *names[COMMANDS];
+    for (int i = 0; i < COMMANDS; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {
             return finish(commands[i].run(argc - 1, argv + 1));
         }
@@ -151,6 +178,6 @@ int main(int argc, char **argv) {
     }
     package_other(argv + 1);
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
-            argv[1], text_nearest(argv[1], names, command_count));
+            argv[1], text_nearest(argv[1], names, COMMANDS));
     return CLI_EXIT_BAD_INPUT;
 }

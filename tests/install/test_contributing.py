@@ -110,7 +110,7 @@ def units(tree, touched):
             "src/env/task/state.h": ["src/env/task/shape.c", "src/deploy/export/describe.c"], "src/env/task/randomize.h": ["src/env/task/env.c"],
             "include/mild/ground.h": ["src/ground/models/models.c", "src/ground/models/material.c"],
             "include/mild/map.h": ["src/ground/terrain/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
-            "src/app/commands.h": ["src/app/commands.c"]}
+            "src/app/commands.h": ["src/app/main.c"]}
     found = []
     for name in touched:
         if name.endswith(".h") and name not in made:
