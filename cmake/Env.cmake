@@ -4,6 +4,9 @@ mild_layer(env layer_task layer_engine)
 # an environment keeps floats, and computes in double where it reads a definition
 set_source_files_properties(env/batch_host.c PROPERTIES COMPILE_OPTIONS
     "$<IF:${mild_sanitized},-O0,-O2>;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
+set(generated ${CMAKE_BINARY_DIR}/generated/env)
+set(envs_names "")
+set(envs_list "")
 if(MILD_CUDA)
   # The kernels, compiled once for each robot, whose sizes the program `engine_sizes` reads from its folder, and once for
   # any robot, last.
@@ -16,7 +19,6 @@ if(MILD_CUDA)
     target_link_libraries(engine_sizes PRIVATE layer_engine mujoco::mujoco mild_options)
   endif()
   add_library(envs_device STATIC)
-  set(generated ${CMAKE_BINARY_DIR}/generated/env)
   function(envs_kernels name sizes) # sizes: text that includes those of a robot
     set(file ${generated}/${name}.cu)
     file(CONFIGURE OUTPUT ${file} CONTENT [=[
@@ -50,14 +52,6 @@ if(MILD_CUDA)
     envs_kernels(${name} "#include \"${generated}/${name}.h\"" ${generated}/${name}.h)
   endforeach()
   envs_kernels(any "/* sizes: the largest */")
-  file(CONFIGURE OUTPUT ${generated}/kernels.c CONTENT [=[
-#define MILD_REAL_FLOAT
-#include "env/kernels.h"
-
-@envs_names@
-const EnvsKernels *const envs_kernels[] = {@envs_list@ NULL};
-]=] @ONLY)
-  target_sources(layer_env PRIVATE ${generated}/kernels.c)
   target_include_directories(envs_device PRIVATE ${CMAKE_BINARY_DIR}/layers/env)
   target_link_libraries(envs_device PRIVATE layer_task layer_engine)
   # as the kernels of the layer batch
@@ -65,3 +59,12 @@ const EnvsKernels *const envs_kernels[] = {@envs_list@ NULL};
   set_target_properties(envs_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(layer_env PUBLIC envs_device CUDA::cudart_static stdc++)
 endif()
+# The list of the kernels: none without CUDA.
+file(CONFIGURE OUTPUT ${generated}/kernels.c CONTENT [=[
+#define MILD_REAL_FLOAT
+#include "env/kernels.h"
+
+@envs_names@
+const EnvsKernels *const envs_kernels[] = {@envs_list@ NULL};
+]=] @ONLY)
+target_sources(layer_env PRIVATE ${generated}/kernels.c)

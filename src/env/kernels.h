@@ -1,5 +1,5 @@
-/* What steps an environment of the batch engine: on the CPU (batch_host.c), on a GPU
- * (batch_device.cu, or batch_without_cuda.c). */
+/* What steps an environment of the batch engine: on the CPU batch_host.c, on a GPU
+ * batch_device.cu. */
 #ifndef ENV_KERNELS_H
 #define ENV_KERNELS_H
 
@@ -80,8 +80,7 @@ typedef struct {
     const char *(*read)(const EnvsArrays *all, const EnvsMotion *motion, MildStream stream);
 } EnvsKernels;
 
-/* Those of this build, NULL behind them: cmake/Env.cmake, or batch_without_cuda.c. A robot takes
- * the first that fit. */
+/* Those of this build, NULL behind them: cmake/Env.cmake. A robot takes the first that fit. */
 extern const EnvsKernels *const envs_kernels[];
 
 /* Of the batch engine: for tests. */
