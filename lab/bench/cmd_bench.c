@@ -9,7 +9,7 @@
 #include "app/robots.h"
 #include "base/text.h"
 #include "bench/bench.h"
-#include "lab/commands.h"
+#include "lab/lists.h"
 #include "run/config/experiment_keys.h"
 
 /* memory comes first, because it reports the peak of the whole process so far. */

@@ -11,7 +11,7 @@
 #include "drive/drive.h"
 #include "drive/simulated.h"
 #include "identify/belief/file.h"
-#include "lab/commands.h"
+#include "lab/lists.h"
 
 #define ADDRESS "127.0.0.1:9870"
 

@@ -13,7 +13,7 @@
 #include "base/text.h"
 #include "identify/belief/file.h"
 #include "know/know.h"
-#include "lab/commands.h"
+#include "lab/lists.h"
 #include "run/config/experiment_keys.h"
 
 #define CLOCK_LEAST 0.2 /* [s] as of task.gait_period */

@@ -1,6 +1,6 @@
 /* One function per command, one file per function: cmd_NAME.c. argv[0] is the command's name;
  * returns the exit code. A command has one row, in COMMAND_LIST; those of
- * lab/commands.h come after them where the lab is built. */
+ * lab/lists.h come after them where the lab is built. */
 #ifndef MILD_COMMANDS_H
 #define MILD_COMMANDS_H
 

@@ -15,7 +15,7 @@
 #include "robot/engine.h"
 
 #ifdef MILD_LAB
-#include "lab/commands.h"
+#include "lab/lists.h"
 #else
 #define LAB_COMMANDS(X)
 #endif

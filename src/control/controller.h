@@ -1,6 +1,6 @@
 /* What moves the robots. A controller is one row of CONTROLLER_LIST and one file that implements
  * this interface. Evaluation and play know nothing else about it. Where the lab is built, the rows
- * of lab/controllers.h follow. */
+ * of lab/lists.h follow. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 

@@ -6,7 +6,7 @@
 #include "control/controller.h"
 
 #ifdef MILD_LAB
-#include "lab/controllers.h"
+#include "lab/lists.h"
 #else
 #define LAB_CONTROLLERS(X)
 #endif

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lab/controllers.h"
+#include "lab/lists.h"
 #include "learn/product.h"
 #include "paper/control/weights.h"
 

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "lab/controllers.h"
+#include "lab/lists.h"
 #include "paper/control/body.h"
 #include "paper/control/walk.h"
 
