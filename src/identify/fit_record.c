@@ -3,8 +3,6 @@
 #include <float.h>
 #include <math.h>
 
-#include "identify/inverse.h"
-
 enum { LOCAL_ROWS = 200, TERMS = 5, TURN_ROWS = 3 };
 
 /* [1/s] A way up faster than this by its depth, such as the rebound of a dropped body, is not the
@@ -85,6 +83,34 @@ int fit_sliding(const FitPoint *points, int *count, FitPoint *slide, int *slides
     }
     *count = begin + 1;
     return *slides - (begin - first + 1);
+}
+
+/* Gauss-Jordan elimination without pivoting. */
+int inverse_find(double a[INVERSE_MAX][INVERSE_MAX], int n,
+                 double inverse[INVERSE_MAX][INVERSE_MAX]) {
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            inverse[i][j] = i == j;
+        }
+    }
+    for (int k = 0; k < n; k++) {
+        if (!(a[k][k] > 1e-14)) {
+            return 0;
+        }
+        double pivot = 1 / a[k][k];
+        for (int j = 0; j < n; j++) {
+            a[k][j] *= pivot;
+            inverse[k][j] *= pivot;
+        }
+        for (int i = 0; i < n; i++) {
+            double factor = a[i][k];
+            for (int j = 0; j < n && i != k; j++) {
+                a[i][j] -= factor * a[k][j];
+                inverse[i][j] -= factor * inverse[k][j];
+            }
+        }
+    }
+    return 1;
 }
 
 /* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.

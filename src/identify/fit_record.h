@@ -62,4 +62,13 @@ int fit_sliding(const FitPoint *points, int *count, FitPoint *slide, int *slides
  * comes from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
 void fit_speeds(FitPoint *points, int count);
 
+/* ---- inverse of a small matrix, for normal equations ---- */
+
+enum { INVERSE_MAX = 20 };
+
+/* Inverse of the positive definite `a` (rows and columns 0 .. n - 1), which is destroyed. Returns
+ * 0 when it is singular. */
+int inverse_find(double a[INVERSE_MAX][INVERSE_MAX], int n,
+                 double inverse[INVERSE_MAX][INVERSE_MAX]);
+
 #endif

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/student.h"
-#include "identify/inverse.h"
 
 /* [-] Relative step of the central differences, which are exact where F is linear. */
 #define FIT_DIFFERENCE 1e-5
