@@ -2,7 +2,7 @@
 #ifndef BENCH_BENCH_H
 #define BENCH_BENCH_H
 
-#include "robot/phases.h"
+#include "robot/robot.h"
 #include "run/train/experiment.h"
 
 /* A row that a bench measured; the command prints and saves them. */

@@ -7,7 +7,6 @@
 
 #include "env/task/task.h"
 #include "robot/float/float_ground.h"
-#include "robot/phases.h"
 
 typedef struct {
     Envs base;

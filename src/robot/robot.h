@@ -175,6 +175,19 @@ typedef struct {
 /* From now on; NULL: libmild again. Shells do not feel another ground. *ground is borrowed. */
 void robot_sim_set_ground(RobotSim *sim, const RobotGround *ground);
 
+/* Time in each phase of a physics step, and steps, summed while attached to a workspace. */
+typedef struct {
+    double smooth; /* [s] mass matrix, factor, bias, smooth acceleration */
+    double map;    /* [s] A = J M^-1 J^T and the free twist */
+    double ground; /* [s] mild_ground_solve and mild_ground_advance, or the engine's collision when
+                      rigid */
+    double finish; /* [s] wrench, joint limits or engine contact solver, integration, next pose */
+    long steps;
+} RobotPhases;
+
+/* phases: NULL stops the timing. */
+void robot_sim_time_phases(RobotSim *sim, RobotPhases *phases);
+
 /* Valid after load or step, in the order of RobotState. */
 const double *robot_sim_qpos(const RobotSim *sim);
 const double *robot_sim_qvel(const RobotSim *sim);

@@ -3,7 +3,7 @@
 #define ROBOT_SIM_H
 
 #include "robot/description.h"
-#include "robot/phases.h"
+#include "robot/robot.h"
 
 #define ROBOT_LANES 8 /* six twist components, padded to one vector register */
 

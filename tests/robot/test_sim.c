@@ -9,7 +9,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include "robot/phases.h"
 #include "widest.h"
 
 static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
