@@ -46,7 +46,7 @@ function(mild_unit unit included)
 endfunction()
 mild_layer(ground/batch layer_ground layer_device)
 # lanes in loops, as in cmake/Env.cmake: nothing gains from -O3 but the time to compile, and with sanitizers nothing from -O1
-set_source_files_properties(ground/batch/bodies_host.c PROPERTIES COMPILE_OPTIONS "$<IF:${mild_sanitized},-O0,-O2>")
+set_source_files_properties(ground/batch/host.c PROPERTIES COMPILE_OPTIONS "$<IF:${mild_sanitized},-O0,-O2>")
 # The step of one robot on the CPU, a unit for each version of contact.inc, since they take long to compile.
 set(host_units "")
 foreach(version "feet 0 0" "feet_map 1 0" "points 0 1" "points_map 1 1")

@@ -33,7 +33,7 @@ MildStatus batch_bodies_end(const MildBatch *batch, const MildBatchInput *input,
                             const MildBatchOutput *output, int advance, MildStream stream,
                             MildError *error);
 
-/* The same on the CPU: bodies_host.c; and on a GPU: bodies.cu, or without_cuda.c. */
+/* The same on the CPU: host.c; and on a GPU: bodies.cu, or without_cuda.c. */
 struct BodiesCall; /* of bodies_robot.h */
 void host_bodies_begin(const struct BodiesCall *call);
 void host_bodies_end(const struct BodiesCall *call);

@@ -312,4 +312,10 @@ typedef struct {
     int *iterations;   /* [1] Newton steps */
 } ContactResult;
 
+/* The step of one robot on the CPU (host.inc): a version of contact.inc in each unit, since they
+ * take long to compile. */
+typedef void HostRobot(const ContactSetup *setup, const ContactProblem *problem,
+                       const ContactMemory *memory, int advance, const ContactResult *result);
+HostRobot host_feet, host_points, host_feet_map, host_points_map; /* in float */
+
 #endif

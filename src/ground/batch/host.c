@@ -1,9 +1,9 @@
 /* The batch on the CPU: the code of the GPU, robot after robot. */
 #define MILD_REAL_FLOAT
 
-#include "ground/batch/host.h"
+#include "ground/batch/bodies_robot.h"
 
-#include "ground/batch/batch.h"
+#include "ground/batch/bodies_batch.h"
 #include "ground/batch/contact_shapes.h"
 #include "ground/batch/robot.inc"
 
@@ -36,5 +36,24 @@ void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBat
         batch_problem(shape, arrays, input, robot, &problem);
         batch_result(shape, output, robot, &result);
         step(&setup, &problem, &memory, advance, &result);
+    }
+}
+
+/* ---- a step with shells ---- */
+
+void host_bodies_begin(const BodiesCall *call) {
+    for (long robot = 0; robot < call->shape.robots; robot++) {
+        bodies_find(call, robot);
+    }
+}
+
+void host_bodies_end(const BodiesCall *call) {
+    BodiesWork work;
+    for (long robot = 0; robot < call->shape.robots; robot++) {
+        if (call->bodies.near[robot]) {
+            bodies_solve(call, robot, &work, LAW_ANY);
+        } else {
+            bodies_rest(call, robot);
+        }
     }
 }
