@@ -1,5 +1,6 @@
 #include <cjson/cJSON.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "app/build.h"
@@ -39,6 +40,30 @@ enum { BENCHES = sizeof benches / sizeof *benches, WORDS };
 static const CliWord record = {
     "record", "first word: benches and peers in turns, as JSON and a page, and their history "
               "(lab/bench/README.md; mild bench record --help)"};
+
+/* ---- the report ---- */
+
+void bench_add(BenchReport *report, const char *bench, const char *name, double value,
+               const char *unit) {
+    if (report->count == report->room) {
+        const int room = 2 * report->room + 8;
+        BenchRow *more = realloc(report->rows, (size_t)room * sizeof *more);
+        if (!more) {
+            report->is_short = 1;
+            return;
+        }
+        report->rows = more;
+        report->room = room;
+    }
+    BenchRow *row = &report->rows[report->count++];
+    *row = (BenchRow){.bench = bench, .unit = unit, .value = value};
+    snprintf(row->name, sizeof row->name, "%s", name);
+}
+
+void bench_report_free(BenchReport *report) {
+    free(report->rows);
+    *report = (BenchReport){0};
+}
 
 static MildStatus save_json(const BenchReport *report, const char *path, MildError *error) {
     char machine[256];
