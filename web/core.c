@@ -10,7 +10,6 @@
 #include "ground/terrain/terrain.h"
 #include "learn/vector.h"
 #include "web/core.h"
-#include "web/window.h"
 
 #define SEED 1
 #define FOOT_FAR 100.0 /* [m] above the ground: nothing touches */

@@ -1,5 +1,5 @@
-/* The window of ground (window.h). */
-#include "web/window.h"
+/* The window of ground (core.h). */
+#include "web/core.h"
 
 #include <math.h>
 #include <stdlib.h>
