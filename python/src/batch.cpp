@@ -1,5 +1,5 @@
 /* mild.Batch: the ground under many robots (include/mild/batch.h), on the CPU or a CUDA device. */
-#include "batch.h"
+#include "ground.h"
 
 #include <cstring>
 

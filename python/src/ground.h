@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "arrays.h"
+#include "mild/batch.h"
 #include "mild/ground.h"
 
 /* A Python object that holds what one of the library's create functions made. */
@@ -65,6 +66,28 @@ template <typename T> T &made_of(nb::handle object, const char *name) {
     }
     return *nb::inst_ptr<T>(object);
 }
+
+/* mild.Batch, as its methods (batch.cpp) and XLA's calls (xla.cpp) see it. */
+struct Batch {
+    MildBatch *batch = nullptr;
+    int robots = 0;
+    int feet = 0;
+    int device = ON_CPU;
+    int materials = 1;
+    int labels = 1;
+    bool has_map = false;
+    std::vector<int> elements; /* of each sole */
+    std::atomic<bool> busy{false};
+    int64_t number = 0; /* of XLA's calls; 0: none yet */
+
+    Batch() = default;
+    Batch(const Batch &) = delete;
+    ~Batch();
+};
+
+/* The number by which XLA's calls find the batch, until it is freed. */
+int64_t xla_number(Batch &batch);
+void xla_forget(Batch &batch);
 
 void bind_material(nb::module_ &module);
 void bind_terrain(nb::module_ &module);

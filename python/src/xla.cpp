@@ -1,5 +1,5 @@
 /* The batch ground as a foreign function of XLA, so that JAX calls it inside jit (mild.jax). */
-#include "batch.h"
+#include "ground.h"
 
 #include <cstring>
 #include <map>
