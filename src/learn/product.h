@@ -6,7 +6,7 @@
 
 /* Limits oneDNN to one thread when called from this thread. Returns the previous setting, which
  * product_leave restores. bf16: bool, until then factors are rounded to bfloat16 where the
- * processor multiplies such numbers (product_bf16). */
+ * processor multiplies such numbers (AVX512_BF16, AMX). */
 int product_enter(int bf16);
 void product_leave(int entered);
 
@@ -19,15 +19,5 @@ void product_on_exception(void (*fatal)(void));
  * drops and counts the minibatch. */
 void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
              const float *b, int ldb, float beta, float *c, int ldc);
-
-/* ---- product_bf16.c ---- */
-
-/* Bool: this processor multiplies bfloat16 (AVX512_BF16, AMX). */
-int product_has_bf16(void);
-
-/* As product, with factors rounded to bfloat16 and sums in float. Returns 0, or 1 when memory runs
- * out or oneDNN fails, with c as it was or partly written. */
-int product_bf16(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
-                 const float *b, int ldb, float beta, float *c, int ldc);
 
 #endif
