@@ -55,8 +55,4 @@ EngineText engine_text_double, engine_text_float;
 /* In double, with the lanes of each block in the opposite order. */
 EngineText engine_text_reverse;
 
-/* [B] Of the working data of any robot, and in float of SA01. */
-size_t engine_work_bytes(void);
-size_t engine_work_bytes_sa01(void);
-
 #endif

@@ -1,8 +1,10 @@
 /* Memory of a robot: what SA01 takes of a device under the default task, by functions
  * compiled for it, and not more than it may. */
+#define MILD_REAL_FLOAT
 #include "env/backend.h"
 #include "kit.h"
 #include "mild/batch.h"
+#include "robot/engine/data.h"
 #include "sa01.h"
 
 enum { ENVS = 2048, GROUNDS = 2 };
@@ -44,6 +46,12 @@ TEST(sizes) {
     const size_t level = measure(NULL), map = measure(&waves);
     assert_true(level <= 12288 && map <= 14900);
     assert_int_equal(map - level, (4 * 160 + 32) * sizeof(float)); /* the ground's */
+}
+
+/* A warp's, in shared memory. */
+TEST(working_data) {
+    printf("working data: %zu B\n", sizeof(EngineWork));
+    assert_true(sizeof(EngineWork) <= 6 * 1024);
 }
 
 TEST_MAIN(NULL, NULL)
