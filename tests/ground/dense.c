@@ -1,7 +1,6 @@
 #include "dense.h"
 
-#include "dense_find.h"
-#include "dense_law.h"
+#include "dense_element.h"
 
 /* The constants of these five. */
 #include "ground/law/begin.h"
