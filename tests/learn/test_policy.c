@@ -18,9 +18,14 @@
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
 #include "learn/safetensors.h"
-#include "learn/values.h"
 
 #define PATH "build_test_policy.safetensors"
+
+/* What the critic says of rows that lie together. */
+static void values_of(Policy *policy, int rows, const float *critic, float *values) {
+    const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, rows}};
+    policy_value_rows(policy, NULL, &all, critic, values);
+}
 
 static Policy *small_policy(uint64_t seed) {
     MildError error = {0};
@@ -66,7 +71,7 @@ TEST(test_rows_in_runs) {
     memset(actions[1], 0xff, sizeof actions[1]);
     memset(values[1], 0xff, sizeof values[1]);
     policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);
-    kit_values(policy, NULL, ROWS, critic, values[0]);
+    values_of(policy, ROWS, critic, values[0]);
     policy_act_rows(policy, pool, &both, history, NULL, actions[1]);
     policy_value_rows(policy, pool, &both, critic, values[1]);
     for (int i = 0; i < ROWS * 12; i++) {
@@ -112,7 +117,7 @@ TEST(test_answers) {
     fill_normal(history, ROWS * 15, 1.0, &random);
     fill_normal(critic, ROWS * 7, 1.0, &random);
     policy_act(policy, NULL, ROWS, history, actions, estimates, latent);
-    kit_values(policy, NULL, ROWS, critic, values);
+    values_of(policy, ROWS, critic, values);
     for (int r = 0; r < ROWS; r++) {
         double x[64], heads[64], theta[64], input[64], mean[64], value[64];
         for (int i = 0; i < 15; i++) {

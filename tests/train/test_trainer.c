@@ -6,7 +6,7 @@
 
 #include "control/controller.h"
 #include "kit.h"
-#include "learn/values.h"
+#include "learn/policy_private.h"
 #include "run/train/trainer.h"
 
 #define POLICY "build_test_trainer.safetensors"
@@ -227,13 +227,14 @@ static void check_all_but_decoder(Policy *a, Policy *b) {
     const int history = def->frames * def->observation;
     static float input[ROWS * 4096], out[2][ROWS * 64];
     Policy *const of[2] = {a, b};
+    const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, ROWS}};
     assert_true(history <= 4096 && def->critic_input <= 4096 && def->actions <= 20);
     for (int i = 0; i < ROWS * 4096; i++) {
         input[i] = (float)sin(0.37 * i);
     }
     for (int k = 0; k < 2; k++) {
         policy_act(of[k], NULL, ROWS, input, out[k], NULL, NULL);
-        kit_values(of[k], NULL, ROWS, input, out[k] + ROWS * 20);
+        policy_value_rows(of[k], NULL, &all, input, out[k] + ROWS * 20);
         memcpy(out[k] + ROWS * 22, policy_std(of[k]), (size_t)def->actions * sizeof(float));
     }
     assert_memory_equal(out[0], out[1], sizeof out[0]);
