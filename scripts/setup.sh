@@ -70,24 +70,25 @@ if ! cmp -s <(pinned scripts/requirements.txt) <(pinned .venv/requirements.insta
     cp scripts/requirements.txt .venv/requirements.installed
 fi
 
-# Sources that are built with ours: the archives of the package index, unpacked into .venv.
-if ! cmp -s scripts/sources.txt .venv/sources.installed; then
+# Sources that are built with ours: the archives of the package index, unpacked into .venv. source_of NAME: its line.
+source_of() { grep "^$1==" scripts/sources.txt; }
+if ! cmp -s <(source_of daqp) .venv/sources.installed; then
     rm -rf .venv/sources .venv/daqp-*
-    scripts/quietly.sh build/log/sources.log "setup: sources of $(cut -d' ' -f1 scripts/sources.txt | paste -sd' ')" \
+    scripts/quietly.sh build/log/sources.log "setup: sources of $(source_of daqp | cut -d' ' -f1)" \
         .venv/bin/python -m pip download --progress-bar off --disable-pip-version-check --no-deps --no-binary daqp --require-hashes \
-        -d .venv/sources -r scripts/sources.txt
+        -d .venv/sources -r <(source_of daqp)
     tar -xzf .venv/sources/daqp-*.tar.gz -C .venv
-    cp scripts/sources.txt .venv/sources.installed
+    source_of daqp >.venv/sources.installed
 fi
 
-if [ -n "$cutlass" ] && ! cmp -s scripts/cutlass.txt .venv/cutlass.installed; then
+if [ -n "$cutlass" ] && ! cmp -s <(source_of nvidia-cutlass) .venv/cutlass.installed; then
     rm -rf .venv/cutlass* .venv/sources/nvidia_cutlass*
     scripts/quietly.sh build/log/cutlass.log "setup: headers of CUTLASS" \
         .venv/bin/python -m pip download --progress-bar off --disable-pip-version-check --no-deps --require-hashes \
-        -d .venv/sources -r scripts/cutlass.txt
+        -d .venv/sources -r <(source_of nvidia-cutlass)
     .venv/bin/python -m zipfile -e .venv/sources/nvidia_cutlass-*.whl .venv/cutlass.unpacked
     mkdir .venv/cutlass
     mv .venv/cutlass.unpacked/cutlass_library/source/include .venv/cutlass.unpacked/*.dist-info/licenses .venv/cutlass/
     rm -rf .venv/cutlass.unpacked
-    cp scripts/cutlass.txt .venv/cutlass.installed
+    source_of nvidia-cutlass >.venv/cutlass.installed
 fi
