@@ -1,5 +1,7 @@
-/* What the task's keys do together: the nominal task, what is refused, gains and limits as texts.
- * Defaults and ranges: config/test_config. */
+/* What the task's keys do together: the nominal task, what is refused, gains and limits as texts;
+ * and what a policy's file says of them, printed and read again, and refused. Defaults and ranges:
+ * config/test_config. */
+#include "env/task/policy_keys.h"
 #include "task_kit.h"
 
 /* What task_def_make_nominal leaves of a random key: [0] and, of a range, [1]. */
@@ -156,6 +158,97 @@ TEST(robot_or_task) {
     def.reward.nominal_height = 0.7;
     expect_near("action scale", task_action_scale(&def, robot_table(robot)), 0.25, 0);
     expect_near("height", task_nominal_height(&def, robot_table(robot)), 0.7, 0);
+}
+
+/* ---- in a policy's file ---- */
+
+#define SHARES "0.6 0.6 0.6 0.6 0.85 0.85"
+#define GAINS "50 50 70 70 20 20 50 50 70 70 20 20"
+
+/* All keys away from their defaults, and others too. */
+static TaskDef changed(void) {
+    TaskDef def = task_def_default();
+    def.gait_period = 0.7;
+    def.gait_slowing = 0.4;
+    def.gait_slow_below = 0.9;
+    def.standing_below = 0.2;
+    def.clock = 0;
+    def.history_stride = 3;
+    def.velocity_scale = 2;
+    def.height_scale = 5;
+    def.action_scale = 0.3;
+    def.action_clip = 7;
+    strcpy(def.torque_share, SHARES);
+    def.torque_hold = 1;
+    strcpy(def.kp, GAINS);
+    strcpy(def.kd, "1.5");
+    def.physics_dt = 0.001;
+    return def;
+}
+
+TEST(printed_and_read) {
+    char text[1024];
+    MildError error = {0};
+    TaskDef from = changed(), to = task_def_default();
+    task_policy_keys_print(&from, text, sizeof text);
+    assert_int_equal(task_policy_keys_read(&to, text, &error), MILD_OK);
+    from.physics_dt = task_def_default().physics_dt; /* no matter of the policy's */
+    assert_memory_equal(&to, &from, sizeof to);
+    assert_int_equal(task_policy_keys_read(&to, "shell_depth = 0.06; clock = true", &error),
+                     MILD_OK);
+    assert_true(to.clock == 1); /* the key before it has no effect any more */
+    to = changed();
+    assert_int_equal(task_policy_keys_read(&to, "", &error), MILD_OK); /* an older file */
+    assert_true(to.gait_period == 0.7 && to.clock == 0);
+}
+
+/* The longest values have room in a policy's file; where they have not, nothing is printed. */
+TEST(lengths) {
+    char text[1024];
+    TaskDef def = changed();
+    memset(def.kp, '1', sizeof def.kp - 1);
+    memset(def.kd, '2', sizeof def.kd - 1);
+    def.kp[sizeof def.kp - 1] = def.kd[sizeof def.kd - 1] = '\0';
+    task_policy_keys_print(&def, text, sizeof text);
+    assert_true(strlen(text) > 2 * sizeof def.kp - 2);
+    assert_string_equal(text + strlen(text) - strlen(def.kd), def.kd);
+    const size_t whole = strlen(text);
+    for (size_t size = 1; size <= whole; size++) {
+        task_policy_keys_print(&def, text, size);
+        assert_string_equal(text, "");
+    }
+}
+
+TEST(refused_of_a_file) {
+    static const struct {
+        const char *text;
+        MildStatus status;
+        const char *names;
+    } texts[] = {
+        {"gait_perion = 1", MILD_ERROR_FORMAT, "gait_perion 1"},
+        {"physics_dt = 0.001", MILD_ERROR_FORMAT, "physics_dt 0.001"},
+        {"clock = true; ; clock = true", MILD_ERROR_FORMAT, "key"},
+        {"gait_period=1", MILD_ERROR_FORMAT, "gait_period=1"},
+        {"gait_period = nan", MILD_ERROR_ARGUMENT, "task.gait_period nan"},
+        {"gait_period = -1", MILD_ERROR_RANGE, "task.gait_period -1 0.2 3"},
+        {"clock = 2", MILD_ERROR_ARGUMENT, "task.clock 2"},
+        {"kp = 1 2", MILD_OK, NULL}, /* a number a joint; the robot says how many */
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        TaskDef def = task_def_default();
+        MildError error = {0};
+        assert_int_equal(task_policy_keys_read(&def, texts[i].text, &error), texts[i].status);
+        if (texts[i].status != MILD_OK) {
+            assert_error(&error, texts[i].status, texts[i].names);
+        }
+    }
+    char text[2000];
+    TaskDef def = task_def_default();
+    MildError error = {0};
+    memset(text, '1', sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    memcpy(text, "kp = ", 5);
+    assert_int_not_equal(task_policy_keys_read(&def, text, &error), MILD_OK);
 }
 
 TEST_MAIN(kit_setup, kit_teardown)
