@@ -107,7 +107,7 @@ try_wheel() {
 # The tutorials' set-up, word for word; the wheel is made.
 try_setup() {
     [[ $wheel = "$root"/* ]] || return 0 # it is a wheel from elsewhere
-    .venv/bin/python tests/install/check_setup.py .
+    .venv/bin/python tests/install/test_tutorials.py .
 }
 # try_chroot SUITE: in a bare Debian, where nothing but its Python is installed, as a user without root. What pip would fetch lies there already.
 try_chroot() {

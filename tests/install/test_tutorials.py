@@ -5,7 +5,11 @@ A block behind 'This is `FILE`' (or `FILE`, in a line that ends with a colon) is
 `python` on the PATH. A block of text is what the block before it prints: words are equal, numbers within 5 % or one of the last digit,
 in a row of walks (it says 3/3 or yes, upright) the speed within 10 % and the rest within half: another processor rounds otherwise, and a
 walk amplifies that. A line '...' stands for any lines. Trainings are cut short by SHORT. The page ends with a picture, which must have been made.
-Usage: test_tutorials.py SOURCE_FOLDER PATH_TO_MILD PYTHON_PACKAGE PAGE [--keep FOLDER]"""
+Usage: test_tutorials.py SOURCE_FOLDER PATH_TO_MILD PYTHON_PACKAGE PAGE [--keep FOLDER]
+
+test_tutorials.py SOURCE_FOLDER (scripts/wheels.sh) follows the set-up, docs/tutorials/README.md: in an empty home, whose `mild` is the source
+tree with its wheel made (`make wheel` itself is not repeated), with this Python as `python3`, without a display. pip fetches what it does for a
+reader."""
 import argparse
 import os
 import pathlib
@@ -150,27 +154,46 @@ def check_itself():
 
 
 
+def programs(folder, **paths):
+    """A folder of programs by these names."""
+    folder.mkdir()
+    for name, program in paths.items():
+        (folder / name).write_text(f'#!/bin/sh\nexec "{program}" "$@"\n', encoding="utf-8")
+        (folder / name).chmod(0o755)
+    return folder
+
+
+def walk_through(args, folder):
+    """How many blocks of the page."""
+    path = programs(folder / "bin", mild=args.mild.resolve(), python=sys.executable)
+    environment = dict(os.environ, PATH=f"{path}:{os.environ['PATH']}", PYTHONPATH=args.package, PYTHONDONTWRITEBYTECODE="1")
+    work = args.keep or folder / "work"
+    work.mkdir(parents=True, exist_ok=True)
+    count = follow(args.source.resolve(), args.page, work, environment)
+    look_for_picture(args.source.resolve(), args.page, work)
+    return count
+
+
+def set_up(source, home):
+    """How many blocks of the set-up."""
+    (home / "mild").symlink_to(source)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL", "MILD", "DISPLAY", "WAYLAND"))}
+    environment.update(HOME=str(home), PATH=f"{programs(home / 'bin', python3=sys.executable)}:/usr/bin:/bin", PIP_DISABLE_PIP_VERSION_CHECK="1")
+    return follow(source, "README", home, environment)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("source", type=pathlib.Path)
-    parser.add_argument("mild", type=pathlib.Path)
-    parser.add_argument("package", help="the folder that has the Python package mild")
-    parser.add_argument("page")
+    parser.add_argument("mild", type=pathlib.Path, nargs="?")
+    parser.add_argument("package", nargs="?", help="the folder that has the Python package mild")
+    parser.add_argument("page", nargs="?", default="README")
     parser.add_argument("--keep", type=pathlib.Path, help="work in this folder, which stays")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        (folder / "bin").mkdir()
-        for name, program in (("mild", args.mild.resolve()), ("python", sys.executable)):
-            (folder / "bin" / name).write_text(f'#!/bin/sh\nexec "{program}" "$@"\n', encoding="utf-8")
-            (folder / "bin" / name).chmod(0o755)
-        environment = dict(os.environ, PATH=f"{folder / 'bin'}:{os.environ['PATH']}", PYTHONPATH=args.package, PYTHONDONTWRITEBYTECODE="1")
-        work = args.keep or folder / "work"
-        work.mkdir(parents=True, exist_ok=True)
         try:
             check_itself()
-            count = follow(args.source.resolve(), args.page, work, environment)
-            look_for_picture(args.source.resolve(), args.page, work)
+            count = walk_through(args, pathlib.Path(folder)) if args.mild else set_up(args.source.resolve(), pathlib.Path(folder))
         except Wrong as wrong:
             sys.exit(f"FAIL: docs/tutorials/{args.page}.md: {wrong}")
     print(f"{args.page}: {count} blocks")
