@@ -1,5 +1,6 @@
-"""Every number and name in the metadata of walk.onnx that a robot's program reads, beside where else it stands: the robot's MJCF and
-robot.ini, the record of `mild eval --actions`, the C of the same policy. Usage: metadata.py ROOT FILE.onnx ACTIONS.csv C_FOLDER"""
+"""The numbers of an exported policy beside where else they stand: of the C the table of joints in docs/policy.md; of walk.onnx every number and
+name of its metadata that a robot's program reads, in the robot's MJCF and robot.ini, the record of `mild eval --actions`, and that C.
+Usage: metadata.py ROOT C_FOLDER [FILE.onnx ACTIONS.csv]"""
 
 import configparser
 import csv
@@ -9,7 +10,22 @@ import sys
 
 import onnx_numpy
 
-root, graph, record, folder = map(pathlib.Path, sys.argv[1:])
+root, folder, *more = map(pathlib.Path, sys.argv[1:])
+
+# the page's table: order of the names, and of each joint the numbers
+weights = (folder / "policy_weights.h").read_text(encoding="utf-8")
+page = (root / "docs/policy.md").read_text(encoding="utf-8")
+rows = [[cell.strip() for cell in line.split("|")] for line in page.splitlines() if line.startswith("| `leg_")]
+pose, kp, kd, limit, low, high = ([float(x.rstrip("f")) for x in re.search(rf"policy_{name}\[.*{{(.*)}};", weights)[1].split(", ")]
+                                  for name in ("pose", "kp", "kd", "limit", "low", "high"))
+assert [row[1].split("`")[1] for row in rows] == re.findall(r'"(.*)"', weights)
+for i, row in enumerate(rows):
+    assert [float(cell) for cell in row[2:6]] == [pose[i], kp[i], kd[i], limit[i]], row
+    assert row[6].endswith(f", {low[i]:g} to {high[i]:g}"), row
+if not more:
+    sys.exit()
+
+graph, record = more
 data = onnx_numpy.Model(graph.read_bytes()).metadata
 numbers = {key: [float(x) for x in value.split(",")] for key, value in data.items() if re.fullmatch(r"[-+.\de,]+", value)}
 header = (folder / "policy.h").read_text(encoding="utf-8")

@@ -30,7 +30,7 @@ near() {
 # ---- C ----
 "$mild" export --c walk || fail "export --c"
 "$mild" export --policy other.safetensors "${other[@]}" --c other || fail "export --c of another policy"
-"$python" "$tests/joints.py" "$root" walk/policy_weights.h || fail "joints of the C"
+"$python" "$tests/metadata.py" "$root" walk || fail "joints of the C"
 if ! short; then # no code of ours runs here: the C that was written, by a compiler of its own
     flags=(-O3 -march=native -Wall -Wextra -Wconversion -pedantic -Werror)
     (cd walk && "${CC:-cc}" -std=c99 "${flags[@]}" policy.c example.c -lm -o run) || fail "C99"
@@ -99,26 +99,26 @@ fi
 "$mild" export --onnx walk_double.onnx --double || fail "export --onnx --double"
 "$mild" export --policy other.safetensors "${other[@]}" --onnx other_double.onnx --double || fail "--double of another policy"
 if ! short; then # numpy does what is written
-    "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
-    "$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
+    "$python" "$tests/test_onnx.py" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
+    "$python" "$tests/test_onnx.py" other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
         action_scale=0.3 standing_below=0.5 clock=1 gait_slowing=0.4 gait_slow_below=0.9 || fail "other.onnx"
     # a robot with driven joints, of which the actions are fewer than the joints
     "$mild" eval --robot g1_29 --ground foam45 --trials 2 --seconds 1 --actions arms.csv >/dev/null || fail "eval of g1_29"
     "$mild" export --robot g1_29 --onnx arms.onnx || fail "export --onnx of g1_29"
-    "$python" "$tests/test_onnx.py" - arms.onnx arms.csv || fail "arms.onnx"
+    "$python" "$tests/test_onnx.py" arms.onnx arms.csv || fail "arms.onnx"
     "$python" "$tests/estimates.py" noisy.csv latent.csv 0.5 estimates.so walk.onnx || fail "estimates of the ONNX"
-    "$python" "$tests/metadata.py" "$root" walk.onnx noisy.csv walk || fail "metadata of walk.onnx"
-    "$python" "$tests/test_onnx.py" --double "$root" walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"
-    "$python" "$tests/test_onnx.py" --double - other_double.onnx other.csv || fail "other_double.onnx"
+    "$python" "$tests/metadata.py" "$root" walk walk.onnx noisy.csv || fail "metadata of walk.onnx"
+    "$python" "$tests/test_onnx.py" --double walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"
+    "$python" "$tests/test_onnx.py" --double other_double.onnx other.csv || fail "other_double.onnx"
     # of the wrong policy: noticed
-    ! "$python" "$tests/test_onnx.py" - other.onnx noisy.csv >/dev/null 2>&1 || fail "another policy passes for the shipped one"
+    ! "$python" "$tests/test_onnx.py" other.onnx noisy.csv >/dev/null 2>&1 || fail "another policy passes for the shipped one"
 fi
 if [ "${RUNTIME:-}" ]; then # make export-check
-    "$python" "$tests/test_onnx.py" --runtime --double "$root" walk_double.onnx exact.csv noisy.csv ||
+    "$python" "$tests/test_onnx.py" --runtime --double walk_double.onnx exact.csv noisy.csv ||
         fail "walk_double.onnx in ONNX Runtime"
-    "$python" "$tests/test_onnx.py" --runtime --double - other_double.onnx other.csv || fail "other_double.onnx in ONNX Runtime"
-    "$python" "$tests/test_onnx.py" --runtime "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
-    "$python" "$tests/test_onnx.py" --runtime - other.onnx other.csv || fail "other.onnx in ONNX Runtime"
+    "$python" "$tests/test_onnx.py" --runtime --double other_double.onnx other.csv || fail "other_double.onnx in ONNX Runtime"
+    "$python" "$tests/test_onnx.py" --runtime walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
+    "$python" "$tests/test_onnx.py" --runtime other.onnx other.csv || fail "other.onnx in ONNX Runtime"
 fi
 bad "--onnx" "$mild" export --onnx -
 bad "/dev/full" "$mild" export --onnx /dev/full
