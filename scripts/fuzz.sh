@@ -1,8 +1,12 @@
 #!/usr/bin/env bash
-# Runs the fuzz targets of tests/fuzz and lab one after the other, with clang's address and undefined-behaviour sanitizers. What they
-# learn is kept in build/fuzz/learned. An input that fails is printed and kept in build/fuzz.
+# Runs the fuzz targets of tests/fuzz and lab one after the other, libFuzzer functions fuzz_NAME.c whose first lines say what must hold, with
+# clang's address, undefined-behaviour and float-cast checks. What they learn is kept in build/fuzz/learned. An input that fails is printed and
+# kept in build/fuzz. Without a limit a run takes 2 to 25 minutes on one core, an hour for model and packet.
 # Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (default 10 million), at most MINUTES each (default no limit).
-# With `merge` as the first word it rewrites tests/fuzz/corpus.tar.xz with the smallest inputs that cover everything found so far.
+#
+# The kept inputs, tests/fuzz/corpus.tar.xz, are the smallest that reach everything; found_* once failed. CMake unpacks them, and `make test`
+# runs each target with replay.c on its own, without clang. With `merge` as the first word this makes the corpus small again and leaves found_*;
+# a new file gets in by `scripts/pack.py tests/fuzz/corpus.tar.xz/NAME found_WHAT`.
 set -eu
 cd "$(dirname "$0")/.."
 runs=${RUNS:-10000000} minutes=${MINUTES:-0} build=build/fuzz

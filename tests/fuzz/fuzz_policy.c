@@ -1,4 +1,5 @@
-/* Any bytes as a policy file, with the checksum put right so that the fuzzer gets past it. */
+/* Any bytes as a policy file, with the checksum put right so that the fuzzer gets past it.
+ * Refused with a message, or finite weights. */
 #include "fuzz.h"
 #include "learn/policy_file.h"
 
