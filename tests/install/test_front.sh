@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The front door: a README that is read in 20 seconds, whose code compiles; an index that names every page; drawings that are the tree.
+# The front door: a README that is read in 20 seconds, whose code compiles; an index that names every page; links that lead somewhere;
+# drawings that are the tree.
 # Usage: test_front.sh SOURCE_FOLDER
 source "$(dirname "$0")/../kit.sh" "$1"
 source=$mild # no program here
@@ -30,6 +31,36 @@ for target in $(cat targets); do # what a page runs next must be there
     make -s -n -C "$source" "$target" | grep -q 'cmake --build build .*--target mild$' || fail "make $target does not build build/mild"
 done
 [ -s targets ] || fail "no page runs build/mild after a target of make"
+
+python3 "$source/scripts/links.py" || fail "links of the tree"
+
+mkdir -p linked/scripts linked/docs linked2
+cp "$source/scripts/links.py" linked/scripts/
+cat >linked/docs/page.md <<'END'
+# One `two`: three
+## Again
+## Again
+```
+# no heading, [no link](nowhere.md)
+```
+Fine: [a](page.md), [b](#one-two-three), [c](../scripts/links.py), [d](page.md#again-1), [e](../docs), [f](https://nowhere.example/x),
+`[code](nowhere.md)`.
+
+    [indented](nowhere.md)
+
+[gone](gone.md), [a link over
+two lines](../gone.png) ![picture](gone.png) [anchor](#four), [other](page.md#no-heading-no-link) [out](../../linked2)
+END
+python3 linked/scripts/links.py >said 2>/dev/null && fail "faults, but exit 0"
+cat >wanted <<'END'
+docs/page.md:12: gone.md: there is no gone.md
+docs/page.md:12: ../gone.png: there is no ../gone.png
+docs/page.md:13: gone.png: there is no gone.png
+docs/page.md:13: #four: no heading of page.md has this anchor
+docs/page.md:13: page.md#no-heading-no-link: no heading of page.md has this anchor
+docs/page.md:13: ../../linked2: outside the tree
+END
+diff wanted said || fail "the check does not say what is wrong"
 
 python3 "$source/scripts/drawings.py" --check || fail "drawings"
 mkdir -p tree/docs tree/scripts
