@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Includes go one way between layers, between headers and between files, where NAME.c and NAME.h are one file. In the
-# layers base and ground so do calls. Usage: test_layers.sh SOURCE_FOLDER LAYER=ARCHIVE...
+# layers base and ground so do calls. The environments' library has no learner. ENVS: it, or empty where it is not built.
+# Usage: test_layers.sh SOURCE_FOLDER ENVS LAYER=ARCHIVE...
 set -eu
-source=$(realpath "$1")
-shift
+source=$(realpath "$1") envs=$2
+shift 2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -73,4 +74,11 @@ sees files
 echo 'ground/b ground/a' >>"$work/calls"
 echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
 sees files
+
+# No policy and no PPO but their numbers, because a wheel is built without them (cmake/Python.cmake).
+if [ -n "$envs" ]; then
+    [ "$(nm "$envs" | grep -cE ' [tT] [a-z]')" -gt 100 ] || fail "no functions found in $envs"
+    ! nm "$envs" | grep -E ' [tT] (policy|ppo|network)_' | grep -vE '_def_|ppo_set_decoder$' ||
+        fail "the environments need the learner for the functions above"
+fi
 echo "$(includes '*.[ch]' "$source/src" "$source/lab" | sort -u | wc -l) includes, $(sort -u "$work/calls" | wc -l) calls: all one way"
