@@ -20,8 +20,8 @@
 #ifndef MILD_ENGINE_STEP_H
 #define MILD_ENGINE_STEP_H
 
-#include "robot/engine/bias.h"
 #include "robot/engine/constraint.h"
+#include "robot/engine/dynamics.h"
 #include "robot/engine/kinematics.h"
 #include "robot/engine/legs.h"
 
