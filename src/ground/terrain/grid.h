@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "ground/terrain/surface.h"
+#include "ground/terrain/map_view.h"
 #include "mild/map.h"
 
 /* Cell (0, 0) begins at (x0, y0), a whole number of half cells from the map's origin. */
