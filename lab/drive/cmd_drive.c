@@ -9,7 +9,6 @@
 #include "app/context.h"
 #include "app/report.h"
 #include "drive/drive.h"
-#include "drive/simulated.h"
 #include "identify/belief/file.h"
 #include "lab/lists.h"
 

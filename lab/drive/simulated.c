@@ -1,4 +1,4 @@
-#include "drive/simulated.h"
+#include "drive/drive.h"
 
 #include <math.h>
 #include <stdlib.h>
