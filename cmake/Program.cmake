@@ -6,8 +6,7 @@ install(TARGETS mild RUNTIME DESTINATION bin COMPONENT program)
 install(FILES ${mujoco_file} DESTINATION ${MILD_MUJOCO_PLACE} COMPONENT program)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/robots ${CMAKE_SOURCE_DIR}/configs ${CMAKE_SOURCE_DIR}/policies
   DESTINATION share/mild COMPONENT program)
-install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py
-  ${CMAKE_SOURCE_DIR}/scripts/pressure.py DESTINATION share/mild/scripts COMPONENT program) # --figure, --pressure
+install(FILES ${CMAKE_SOURCE_DIR}/scripts/draw.py DESTINATION share/mild/scripts COMPONENT program) # --figure, --pressure
 install(FILES ${CMAKE_SOURCE_DIR}/python/mild/report.py DESTINATION share/mild/python/mild COMPONENT program) # mild report
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION share/mild COMPONENT program)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/web DESTINATION share/mild/build COMPONENT program OPTIONAL) # where scripts/web.sh ran

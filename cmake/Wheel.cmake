@@ -67,7 +67,7 @@ install(DIRECTORY ${CMAKE_SOURCE_DIR}/configs ${CMAKE_SOURCE_DIR}/robots DESTINA
 if(MILD_APP)
   file(GLOB policies ${CMAKE_SOURCE_DIR}/policies/*.safetensors) # not the paper's, 12 MB
   install(FILES ${policies} DESTINATION mild/data/policies COMPONENT python_data)
-  install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py ${CMAKE_SOURCE_DIR}/scripts/pressure.py
+  install(FILES ${CMAKE_SOURCE_DIR}/scripts/draw.py
     DESTINATION mild/data/scripts COMPONENT python_data OPTIONAL) # --figure, --pressure
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION mild/data/docs COMPONENT python_data OPTIONAL)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/build/web DESTINATION mild/data/build COMPONENT python_data OPTIONAL) # `make web` ran

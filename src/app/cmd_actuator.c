@@ -46,7 +46,7 @@ static MildStatus draw(const char *picture, const char *text, size_t size, MildE
         status = report_text(text, size, data, error);
     }
     return status == MILD_OK && strcmp(data, picture) != 0
-               ? figure_draw("scripts/actuator.py", data, picture, NULL, error)
+               ? figure_draw("actuator", data, picture, NULL, error)
                : status;
 }
 

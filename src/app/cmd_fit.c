@@ -567,7 +567,7 @@ static MildStatus figure_save(const FitWork *work, const char *figure, MildError
         status = data_write(work, data, error);
     }
     if (status == MILD_OK) {
-        status = figure_draw("scripts/fit.py", data, figure, NULL, error);
+        status = figure_draw("fit", data, figure, NULL, error);
     }
     return status;
 }

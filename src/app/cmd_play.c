@@ -306,7 +306,7 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
     }
     status = pressure_write(c->play.pressure, data, labels, error);
     if (status == MILD_OK && strcmp(data, c->pressure) != 0) {
-        status = figure_draw("scripts/pressure.py", data, c->pressure, NULL, error);
+        status = figure_draw("pressure", data, c->pressure, NULL, error);
     }
     return status;
 }

@@ -155,13 +155,13 @@ static MildStatus figure_save(const PressOptions *options, const Tool *tool, con
     const char *figure = options->figure;
     snprintf(title, sizeof title, "%s (%s) under %s", options->ground, model, tool->name);
     if (options->csv && strcmp(options->csv, "-") != 0) {
-        return figure_draw("scripts/press.py", options->csv, figure, title, error);
+        return figure_draw("press", options->csv, figure, title, error);
     }
     MildStatus status = path_beside(figure, ".csv", data, error);
     if (status == MILD_OK) {
         status = csv_write(result, more, data, error);
     }
-    return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, title, error) : status;
+    return status == MILD_OK ? figure_draw("press", data, figure, title, error) : status;
 }
 
 /* ---- the printed result ---- */

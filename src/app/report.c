@@ -37,16 +37,18 @@ MildStatus report_save(cJSON *root, const char *path, MildError *error) {
 
 extern char **environ;
 
-MildStatus figure_draw(const char *script, const char *data, const char *picture, const char *title,
+MildStatus figure_draw(const char *kind, const char *data, const char *picture, const char *title,
                        MildError *error) {
-    char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256];
+    char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256],
+        what[32];
     path_data(".venv/bin/python", python);
-    path_data(script, code_path);
+    path_data("scripts/draw.py", code_path);
     FILE *text = file_open(code_path, error); /* as an input, it cannot be the output, too */
     if (!text) {
         return error->status;
     }
     fclose(text);
+    snprintf(what, sizeof what, "%s", kind);
     snprintf(from, sizeof from, "%s", data);
     snprintf(to, sizeof to, "%s", picture);
     snprintf(above, sizeof above, "%s", title ? title : "");
@@ -54,7 +56,7 @@ MildStatus figure_draw(const char *script, const char *data, const char *picture
         const char *caller = getenv("MILD_PYTHON"); /* of python -m mild */
         snprintf(python, sizeof python, "%s", caller && *caller ? caller : "python3");
     }
-    char *arguments[] = {python, code_path, from, to, title ? above : NULL, NULL};
+    char *arguments[] = {python, code_path, what, from, to, title ? above : NULL, NULL};
     pid_t child;
     int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
     while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) {

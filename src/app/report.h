@@ -13,11 +13,11 @@ MildStatus report_text(const char *text, size_t size, const char *path, MildErro
  * stdout. */
 MildStatus report_save(cJSON *root, const char *path, MildError *error);
 
-/* ---- Python scripts draw the figures from CSV files that the program writes ---- */
+/* ---- a Python script draws the figures from CSV files that the program writes ---- */
 
-/* Runs a shipped script ("scripts/fit.py") with the arguments `data`, `picture` and, unless it is
- * NULL, `title`. Uses the Python of .venv, or else the system's. */
-MildStatus figure_draw(const char *script, const char *data, const char *picture, const char *title,
+/* Runs scripts/draw.py with the arguments `kind` ("fit"), `data`, `picture` and, unless it is NULL,
+ * `title`. Uses the Python of .venv, or else the system's. */
+MildStatus figure_draw(const char *kind, const char *data, const char *picture, const char *title,
                        MildError *error);
 
 #endif

@@ -1,5 +1,5 @@
 /* Sole pressure of a walk: mean and peak per element and the path of the centre of pressure over a
- * stance, for each foot and each material walked on. Written as CSV; scripts/pressure.py draws it.
+ * stance, for each foot and each material walked on. Written as CSV; scripts/draw.py draws it.
  */
 #ifndef VIEW_PRESSURE_H
 #define VIEW_PRESSURE_H
