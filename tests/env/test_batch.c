@@ -82,11 +82,6 @@ TEST(follows_mujoco_on_coarse_soles) {
     follow(SA01, coarse_def(), MILD_BATCH_HOST, &map, 0.85);
 }
 
-/* Four round feet; on a map in test_go1.c. */
-TEST(go1_follows_mujoco) {
-    follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
-}
-
 /* Arms that something else moves. Their targets are those of the CPU to the last bit. */
 static TaskDef driven_def(void) {
     TaskDef def = some_def();

@@ -1,4 +1,5 @@
-/* As test_batch.c, by functions that are compiled for the Go1 alone (tests/CMakeLists.txt). */
+/* Four round feet as the two of test_batch.c, by functions that are compiled for the Go1 alone
+ * (tests/CMakeLists.txt). */
 #include "follow.h"
 
 TEST(go1_follows_mujoco) {
