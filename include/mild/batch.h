@@ -128,8 +128,8 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
  * step, but on the CPU. What the robots remember goes to the CPU and back, 9 kB for a foot of 77
  * elements. Where the new ground must lie lower under a robot, a batch on level ground goes on as
  * one on a map, whose steps take longer, until mild_batch_set_map. Fails as
- * mild_batch_set_materials does; without memory for these planes with the new materials, and what
- * the robots remember as it was. */
+ * mild_batch_set_materials does, and on a map of more than MILD_MATERIALS_MAX labels; without
+ * memory for these planes with the new materials, and what the robots remember as it was. */
 MildStatus mild_batch_change_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                        const int32_t *material, MildError *error);
 

@@ -208,4 +208,29 @@ TEST(materials_change_under_a_robot) {
     }
 }
 
+/* A ground has MILD_MATERIALS_MAX materials. On a map of more labels than that nothing changes. */
+TEST(a_map_of_many_labels_is_refused) {
+    enum { LABELS = 2 * MILD_MATERIALS_MAX };
+    MildError e = {0};
+    const MildMaterial sand = mild_material_default(), grass = kit_preset("grass");
+    MildMapDef def = mild_map_def_default();
+    def.patches = MILD_PATTERN_STRIPES;
+    const int32_t none[LABELS] = {0};
+    for (def.patch_count = MILD_MATERIALS_MAX; def.patch_count <= LABELS;
+         def.patch_count += MILD_MATERIALS_MAX) {
+        MildMap *map = mild_map_create(&def, &e);
+        MildBatch *batch = open_batch(1, &e);
+        assert_int_equal(mild_batch_set_materials(batch, &sand, 1, &e), MILD_OK);
+        assert_int_equal(mild_batch_set_map(batch, map, &e), MILD_OK);
+        const MildStatus status = mild_batch_change_materials(batch, &grass, 1, none, &e);
+        if (def.patch_count == LABELS) {
+            assert_refused(status, MILD_ERROR_RANGE, &e, "24 12 mild_batch_set_materials");
+        } else {
+            expect_good(status == MILD_OK, &e);
+        }
+        mild_batch_destroy(batch);
+        mild_map_destroy(map);
+    }
+}
+
 TEST_MAIN(open_soles, close_soles)

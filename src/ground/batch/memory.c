@@ -343,7 +343,8 @@ static MildStatus robots_take(const MildBatch *batch, Robots *robots, MildError 
     return mild_batch_store_robots(batch, 0, batch->shape.robots, robots->grounds, error);
 }
 
-/* What a robot stands on, a material a label. index: [labels], or NULL as in MildBatchInput. */
+/* What a robot stands on, a material a label, of which there are at most MILD_MATERIALS_MAX. index:
+ * [labels], or NULL as in MildBatchInput. */
 static void terrain_of(MildTerrain *terrain, int labels, const MildMaterial *materials, int count,
                        const int32_t *index) {
     terrain->material_count = labels;
@@ -355,6 +356,16 @@ static void terrain_of(MildTerrain *terrain, int labels, const MildMaterial *mat
     }
 }
 
+/* A ground has room for MILD_MATERIALS_MAX materials, a label of a map is a byte. */
+static MildStatus check_labels(int labels, MildError *error) {
+    return labels <= MILD_MATERIALS_MAX
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_RANGE,
+                           "batch: a map of %d labels; materials can change under robots on one of "
+                           "at most %d: use mild_batch_set_materials and mild_batch_reset",
+                           labels, MILD_MATERIALS_MAX);
+}
+
 /* Bool: the ground lies lower under an element. */
 static int is_lowered(const MildGround *ground) {
     int lowered = 0;
@@ -364,10 +375,10 @@ static int is_lowered(const MildGround *ground) {
     return lowered;
 }
 
-/* Re-expresses what the robots remember. Returns bool: some ground lies lower. */
-static int robots_change(const MildBatch *batch, const Robots *robots,
+/* Re-expresses what the robots remember. labels: of the map, 1 without. Returns bool: some ground
+ * lies lower. */
+static int robots_change(const MildBatch *batch, const Robots *robots, int labels,
                          const MildMaterial *materials, int count, const int32_t *material) {
-    const int labels = batch->shape.map ? batch->arrays.map.labels : 1;
     const MildMaterial sand = mild_material_default();
     MildTerrain from = mild_terrain_uniform(&sand), to = from;
     int lowered = 0;
@@ -386,9 +397,11 @@ MildStatus mild_batch_change_materials(MildBatch *batch, const MildMaterial *mat
     Robots robots = {NULL, NULL};
     MildError own = {0};
     error = error ? error : &own;
-    MildStatus status = robots_take(batch, &robots, error);
-    const int lowered =
-        status == MILD_OK && count > 0 && robots_change(batch, &robots, materials, count, material);
+    const int labels = batch->shape.map ? batch->arrays.map.labels : 1;
+    MildStatus status = check_labels(labels, error);
+    status = status == MILD_OK ? robots_take(batch, &robots, error) : status;
+    const int lowered = status == MILD_OK && count > 0 &&
+                        robots_change(batch, &robots, labels, materials, count, material);
     if (status == MILD_OK) {
         status = mild_batch_set_materials(batch, materials, count, error);
     }
