@@ -560,9 +560,9 @@ typedef struct {
  * inverse_inertia of zeros in `input` they are those at twists that are given. Of a number that
  * switches a rule off at 0 (slip_length, grip, plate_width) there is none at 0: its column is 0. So
  * is that of a number that is infinite. Cost: docs/gradients.md. Fails when the step has not
- * converged, when its solver is MILD_SOLVER_EXPLICIT, when `work` is missing or of other soles,
- * when the material or a field does not exist or is no number, and when the equations are
- * singular. */
+ * converged, when its solver is MILD_SOLVER_EXPLICIT, when input->feet is not the scratch's, when
+ * `work` is missing or of other soles, when the material or a field does not exist or is no number,
+ * and when the equations are singular. */
 MildStatus mild_ground_derivative(const MildGround *ground, const MildTerrain *terrain,
                                   const MildContactInput *input, MildScratch *scratch,
                                   const MildContactResult *result,

@@ -604,6 +604,11 @@ TEST(what_is_refused) {
     kit.result.converged = 0;
     assert_refused(DERIVE(), MILD_ERROR_ARGUMENT, &error, "converged");
     kit.result.converged = 1;
+    kit.input.feet = 0; /* which no solve reads, but differences move so many feet */
+    assert_refused(DERIVE(), MILD_ERROR_ARGUMENT, &error, "input.feet 0 1");
+    kit.input.feet = MILD_FEET_MAX + 1;
+    assert_refused(DERIVE(), MILD_ERROR_ARGUMENT, &error, "input.feet 17 1");
+    kit.input.feet = 1;
     assert_int_equal(DERIVE(), MILD_OK);
     mild_scratch_destroy(work);
     mild_scratch_destroy(small);

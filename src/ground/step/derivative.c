@@ -504,6 +504,11 @@ derivative_check(const MildGround *ground, const MildTerrain *terrain,
     if (!result->converged) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "derivative: the step has not converged");
     }
+    if (input->feet != scratch->feet) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "derivative: input.feet = %d, but the scratch has %d", input->feet,
+                         scratch->feet);
+    }
     const int needs = input->solver != MILD_SOLVER_NEWTON || is_differenced(derivative);
     const MildScratch *work = derivative->work;
     if (needs && (!work || work == scratch || !scratch_fits(work, ground))) {
