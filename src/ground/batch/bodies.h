@@ -505,7 +505,7 @@ MILD_HD void bodies_begin(const BodiesSetup *setup, const BodiesWork *work, int 
     }
     if (own->curves & LAW_CONE) {
         const int cone = own->curves & (LAW_CONE | LAW_HEAP);
-        const int created = e->law.mass_rate < 0 || e->law.drag_rate < 0;
+        const int created = law_creates(e->law.mass_rate, e->law.drag_rate);
         if (created && own->depth > 0 && e->middle >= own->before.depth_max) {
             e->explicit_impulse = element_explicit(e, cone, dt, free);
         }

@@ -30,8 +30,8 @@ MILD_HD int slot_stays(const Slots *s, int i, Real m1, int prints) {
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
  * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
  * depth. A greater depth never means more force, and an element takes a lesser one while it carries
- * nothing, so this adds no energy. v: its velocity in
- * the frame of the foot. refill: [-] of the material. */
+ * nothing, so this adds no energy. v: its velocity in the frame of the foot. refill: [-] of the
+ * material. */
 static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                             const SlotVelocity *v, int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
@@ -95,7 +95,7 @@ static __attribute__((cold, noinline)) void foot_peaks(const Advance *a, const M
     for (int e = 0; e < a->foot->elements; e++) {
         const Slots *s = slot_block(a->foot, e);
         const int i = e % SLOT_LANES;
-        const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, SLOT_UNEVEN);
         const double middle = s->depth[i] + a->dt / 2 * v.descent;
         if (memory->depth_max[e] > 0.0 && element_turns(s->entry_speed[i], v.descent)) {
             slot_raise(a, memory, s, i, e, &v, middle);

@@ -118,21 +118,21 @@ static void foot_normals(const FootScratch *foot, Real dt, const Motion *motion)
         // fall through
     case LAW_CONE | LAW_HEAP:
         if (foot->uneven || foot->stops) {
-            foot_normal(foot, dt, motion, 1, LAW_CONE | LAW_HEAP, 1);
+            foot_normal(foot, dt, motion, SLOT_UNEVEN, LAW_CONE | LAW_HEAP, 1);
         } else {
             foot_normal(foot, dt, motion, 0, LAW_CONE | LAW_HEAP, 0);
         }
         return;
     case LAW_LINE: /* a power without force */
-    case LAW_POWER: foot_normal(foot, dt, motion, 1, LAW_POWER, 0); return;
-    case LAW_ELASTIC: foot_normal(foot, dt, motion, 1, LAW_ELASTIC, 0); return;
+    case LAW_POWER: foot_normal(foot, dt, motion, SLOT_UNEVEN, LAW_POWER, 0); return;
+    case LAW_ELASTIC: foot_normal(foot, dt, motion, SLOT_UNEVEN, LAW_ELASTIC, 0); return;
     default: foot_normal(foot, dt, motion, SLOT_UNEVEN | SLOT_SHELL, LAW_ANY, 1); return;
     }
 }
 
-/* Adds friction to the impulses. Where the ground is not level the
- * normal impulse is I_z g with g = (-slope, 1) = -grad u, so it does work exactly when u changes.
- * Its vertical part is the paper's. With
+/* Adds friction to the impulses. Where the ground is not level the normal impulse is I_z g with g =
+ * (-slope, 1) = -grad u, so it does work exactly when u changes. Its vertical part is the paper's.
+ * With
  *
  *     f = -d friction/dv,   k = -dI_z/dw,   c = g + d friction/dI_z
  *
@@ -230,7 +230,7 @@ static void foot_frictions(const FootScratch *foot, const Motion *motion, int he
     if (held || foot->turned || foot->shell) {
         foot_friction(foot, motion, SLOT_UNEVEN | SLOT_SHELL, held, 1);
     } else if (foot->uneven) {
-        foot_friction(foot, motion, 1, 0, 0);
+        foot_friction(foot, motion, SLOT_UNEVEN, 0, 0);
     } else {
         foot_friction(foot, motion, 0, 0, 0);
     }
@@ -243,10 +243,11 @@ static void pass(MildScratch *scratch, double dt, const double *twist, int held)
         double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
         const Motion motion = foot_moves(foot, twist + 6 * k);
-        for (int curve = LAW_POWER; curve <= LAW_ELASTIC; curve *= LAW_ELASTIC / LAW_POWER) {
-            if (foot->curves & curve) { /* elsewhere they are multiplied by 0 */
-                foot_powers(foot, dt, &motion, curve);
-            }
+        if (foot->curves & LAW_POWER) { /* elsewhere they are multiplied by 0 */
+            foot_powers(foot, dt, &motion, LAW_POWER);
+        }
+        if (foot->curves & LAW_ELASTIC) {
+            foot_powers(foot, dt, &motion, LAW_ELASTIC);
         }
         foot_normals(foot, dt, &motion);
         foot_frictions(foot, &motion, held);

@@ -6,6 +6,7 @@
 #include "ground/step/step.h"
 #include "ground/terrain/terrain.h"
 
+/* Calls element_begin. curves, kind: constants in a vector loop. */
 MILD_HD void slot_begin(Slots *s, int i, Real dt, Real rate, const Motion *motion, int curves,
                         int kind) {
     const SlotVelocity v = slot_velocity(s, i, motion, kind);
@@ -67,6 +68,8 @@ static void slots_lean(const FootScratch *foot) {
     }
 }
 
+/* Calls element_share with the cosine and the ground ahead that the slot has, and keeps what it
+ * changes. */
 MILD_HD void slot_carry(Slots *s, int i, Real dt, Real rate, const Motion *now) {
     const SlotVelocity v = slot_velocity(s, i, now, SLOT_UNEVEN | SLOT_SHELL);
     const ElementMemory memory = slot_memory(s, i);
@@ -179,8 +182,8 @@ static void slots_clear(const FootScratch *foot) {
 static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
     int any = 0;
     for (int m = 0; m < materials; m++) {
-        any |=
-            foot->derived[m].slot.law.mass_rate < 0.0 || foot->derived[m].slot.law.drag_rate < 0.0;
+        const Law *law = &foot->derived[m].slot.law;
+        any |= law_creates(law->mass_rate, law->drag_rate);
     }
     for (int i = 0; any && i < foot->active; i++) {
         Slots *s = slot_block(foot, i);

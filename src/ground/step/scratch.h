@@ -53,8 +53,9 @@ typedef struct FootScratch {
     double *area_share; /* [padded] [-] projected area over pitch^2; 0: faces up. shell_locate */
     double least;       /* [m] elements deeper than this may touch: foot_set_least */
 
-    /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
-     * arm[2] + height arm[3]. */
+    /* Pose: foot_set_pose; frame and lever: foot_frame; depths and gradients: foot_locate,
+     * shell_list. The vector from the ankle to an element is
+     * p = arm[0] + x arm[1] + y arm[2] + height arm[3]. */
     double origin[3];   /* [m] the ankle, world */
     double arm[4][3];   /* world: the frame's point (0, 0, z) [m], its axes [-], z for a shell */
     int framed;         /* bool: the sole presses in a frame of its own */
@@ -80,8 +81,8 @@ typedef struct FootScratch {
     int nan;    /* bool: a material of the terrain contains NaN */
     int turned; /* bool: turn_x or turn_y may be nonzero */
     int stops;  /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
-    int32_t
-        *slot_material;   /* [SLOTS_PADDED] material whose law the slot has, encoded as in Memory */
+    /* [SLOTS_PADDED] Material whose law the slot has, encoded as in Memory. */
+    int32_t *slot_material;
     int32_t *slot_holder; /* [SLOTS_PADDED] element whose law it has, for heaps */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots *slot; /* [SLOTS_PADDED(padded)/SLOT_LANES] blocks */

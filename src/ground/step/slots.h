@@ -129,9 +129,9 @@ typedef struct {
     Lanes hzz; /* [kg] */
 
     /* Working arrays of the solvers. */
-    Lanes bound;       /* [N s] friction bound held by Newton's method: bounds_move */
+    Lanes bound;       /* [N s] friction bound held by Newton's method: bounds_begin, bounds_move */
     Lanes bound_moved; /* [N s] its last change */
-    Lanes fx;          /* [N s] friction without drift damping: sweep_element */
+    Lanes fx;          /* [N s] friction without drift damping: sweep_element; [N] slots_elastic */
     Lanes fy;          /* [N s] */
 } Slots;
 #define SLOT_NUMBERS (sizeof(Slots) / sizeof(Lanes))

@@ -66,7 +66,7 @@ MildGround ground_layout(const MildSole *const *soles, int feet, int tiles);
 /* Bool: the block, which may hold any bytes, is the memory of a ground with the header `layout`. It
  * must be as large as such a ground. Everything that a step follows is then within bounds. */
 int ground_is_valid(const MildGround *ground, const MildGround *layout);
-/* Clears the memory of an element, but for `share`, and sets its material. */
+/* Clears the memory of an element, but for its plane and area share, and sets its material. */
 void memory_forget(const Memory *memory, int e, int32_t material);
 /* The imprints, under the same condition as ground_memory. */
 Imprints ground_imprints(const MildGround *ground);

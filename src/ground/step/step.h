@@ -83,9 +83,10 @@ void slots_pad(const FootScratch *foot);
 
 /* ---- shell.c: shells (docs/model.md, section 20): elements with a height, normal and area ---- */
 
-/* The same for a shell: lists the elements that face down, too. */
+/* foot_locate and foot_list of a shell: lists the elements near the ground that face down, too.
+ * steepest: as for foot_is_away. */
 void shell_list(FootScratch *foot, const MildTerrain *terrain, double steepest);
-/* Gives the slots their elements, material and ground, as foot_prepare does for a plane sole. now:
+/* Gives the slots their elements, material and ground, as foot_slots does for a plane sole. now:
  * motion at the start of the step. Imprints take the elements for level squares. */
 void shell_slots(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,
                  const Memory *memory, const Motion *now, double dt);
