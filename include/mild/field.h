@@ -47,7 +47,8 @@ MildStatus mild_fields_check(const MildField *fields, int count, const void *def
 
 /* Parses `text` into the field of the struct `def`. Array values are separated by spaces or commas.
  * Fails with MILD_ERROR_ARGUMENT when the text does not consist of `count` values of the type, and
- * with MILD_ERROR_RANGE when a value is out of range. On failure nothing is written. */
+ * with MILD_ERROR_RANGE when a value is out of range or a text too long. On failure nothing is
+ * written. */
 MildStatus mild_field_parse(const MildField *field, void *def, const char *text,
                             const char *section, MildError *error);
 

@@ -235,8 +235,9 @@ typedef struct {
  * it. */
 typedef struct MildSole MildSole;
 /* Makes a sole. Returns NULL, with the name of the field in *error, when the outline encloses no
- * area, crosses itself or is not finite, when pitch or target_elements is out of range or needs
- * more than 65536 cells, or when out of memory. `def` is not kept. */
+ * area, crosses itself or is not finite, when a number is out of range, when more than 65536 cells
+ * would be needed, when the outline holds the centre of no cell or fewer cells than target_elements
+ * touch it, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_create(const MildSoleDef *def, MildError *error);
 /* Frees a sole; NULL is allowed. Scratches and grounds made from it stay valid. */
 void mild_sole_destroy(MildSole *sole);
@@ -297,9 +298,9 @@ typedef struct {
  * surface is carried from its rim, and elements steeper than 60 degrees carry next to nothing
  * (docs/model.md, section 23). A shell serves wherever a sole does, except in
  * mild_sole_concentric and mild_model_match, which refuse it, and mild_sole_sinkage, which takes it
- * for a level sole. Returns NULL, with the name of the field in *error, when a
- * number is out of range, when a closed mesh has its triangles turned inward, when nothing is left
- * or more than 65536 elements are, or when out of memory. `def` is not kept. */
+ * for a level sole. Returns NULL, with the name of the field in *error, when a number is out of
+ * range, when a closed mesh has its triangles turned inward, when nothing is left or more than
+ * 65536 elements are, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error);
 /* Arrays of mild_sole_elements() numbers owned by the sole, for each element of a shell: height
  * above the frame's origin [m] (mild_sole_z is their mean), component of the outward unit normal
@@ -311,7 +312,8 @@ const double *mild_sole_surface_area(const MildSole *sole);
 
 /* Makes a sole of one element for the concentric models. The element lies at the centroid of the
  * elements of `sole` and has their total area. It transmits a force but no moment about its centre.
- * Destroy it like any other sole. Returns NULL when out of memory. */
+ * Destroy it like any other sole. Returns NULL, with the reason in *error, for a shell or when out
+ * of memory. */
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 
 /* ---- element law in closed form (eqs 1 to 5, docs/model.md section 3) ---- */
@@ -340,9 +342,9 @@ double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, dou
  * is a good load. Friction, drift, recovery and bed are those of `from`, apart from what
  * MildModelInfo.match_note names; from `mild_merged` into another model slip costs nothing. sole:
  * the raster. For a concentric model the result belongs to mild_sole_concentric of that raster.
- * Fails, with *rival unchanged, for rigid, when `from` is a material of another model or fails
- * mild_material_check, when the load is not positive, or when the result fails
- * mild_material_check. */
+ * Fails, with *rival unchanged, for rigid, for a shell unless `model` is that of `from`, when
+ * `from` is a material of another model or fails mild_material_check, when the load is not
+ * positive, or when the result fails mild_material_check. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *from, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
@@ -456,9 +458,9 @@ void mild_ground_reset(MildGround *ground);
 
 /* [B] The same for ground that remembers imprints: pressed ground keeps its depth after the foot
  * has lifted off, and an element that comes down there later finds it (docs/model.md section 5).
- * Imprints are stored in the block, in `tiles` squares of 8 x 8 cells, whose edge is half the pitch
- * of the first sole. When all tiles are in use the oldest are forgotten. The imprint of a foot of
- * 0.27 x 0.10 m takes about ten tiles. tiles: rounded up to a multiple of 8, at most
+ * Imprints are stored in the block, in `tiles` squares of 8 x 8 cells, whose edge is half the
+ * largest pitch of the soles. When all tiles are in use the oldest are forgotten. The imprint of a
+ * foot of 0.27 x 0.10 m takes about ten tiles. tiles: rounded up to a multiple of 8, at most
  * MILD_IMPRINT_TILES_MAX; 0: no imprints. */
 #define MILD_IMPRINT_TILES_MAX 65536
 size_t mild_ground_bytes_imprints(const MildSole *const *soles, int feet, int tiles);

@@ -88,8 +88,9 @@ typedef struct MildMap MildMap;
 
 #define MILD_MAP_POINTS_MAX (1 << 26) /* largest number of heights, and of labels, of a map */
 /* Makes a map. Returns NULL, with the field's name and the remedy in *error, when a number is out
- * of range or not finite, when an image is missing, too small or contains a value that is not
- * finite, when there are more than MILD_MAP_POINTS_MAX points, or when out of memory. */
+ * of range or not finite, when `border` is wider than patch_size or spans too many cells, when an
+ * image is missing, too small or contains a value that is not finite, when there are more than
+ * MILD_MAP_POINTS_MAX points, or when out of memory. */
 MildMap *mild_map_create(const MildMapDef *def, MildError *error);
 /* Frees a map; NULL is allowed. No terrain may use it afterwards. */
 void mild_map_destroy(MildMap *map);
