@@ -112,7 +112,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     Real worn = 0;
     after = element_sunk(after, sinks, stays);
     if (own.curves & LAW_HEAP) {
-        worn = element_wear_alone(e, &own.share, &own.before, &after, dt, normal, v.x, v.y,
+        worn = element_wear_alone(e, &own.before, &own.share, &after, dt, normal, v.x, v.y,
                                   v.descent, stays);
     }
     if (stays) {

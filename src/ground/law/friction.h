@@ -165,6 +165,7 @@ MILD_HD void element_shear_of(Element *e, const ElementMemory *memory, const She
     friction_hold(e, memory, dt, rate, force);
 }
 
+/* The same with the force that the law has at the yield depth. */
 MILD_HD void element_shear(Element *e, const ElementMemory *memory, const Shear *shear, int curves,
                            Real dt, Real rate) {
     const Real force =

@@ -140,12 +140,14 @@ typedef struct {
     PowerWay elastic; /* of the elastic curve; unused without LAW_ELASTIC */
 } ImpulsePowers;
 
+/* The elastic curve over the part of the way from m0 to m1, `middle`, that is in the ground. */
 MILD_HD PowerWay elastic_way(const Element *e, Real middle) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
     return power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
 }
 
+/* The powers of the curves that `curves` has, at the new downward speed. */
 MILD_HD ImpulsePowers element_powers(const Element *e, int curves, Real dt, Real speed) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);
@@ -197,6 +199,7 @@ MILD_HD Impulse element_impulse_of(const Element *e, int curves, int stops, Real
     return sum;
 }
 
+/* The same with the powers. */
 MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
     const ImpulsePowers powers = element_powers(e, curves, dt, speed);
     return element_impulse_of(e, curves, stops, dt, speed, &powers);

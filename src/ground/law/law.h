@@ -33,9 +33,11 @@
  *
  *     P(u)   = min(u, u_b) + u_f (t - t^2 + t^3/3),   t = clamp((u - u_b)/u_f, 0, 1)
  * With u_b = 0 it is the cone above. F_g stays, but the ground that moves with a sole is set in
- * motion more slowly, in proportion to the depth, until it is as much as the whole heap:
+ * motion more slowly, in proportion to the depth, until it is as much as the whole heap, and more
+ * slowly still from there:
  *
- *     m_a    = c_g phi rho nu s P_m,              P_m(u) = min(u/LAW_MOVES, u_b + u_f/3)
+ *     m_a    = c_g phi rho nu s P_m
+ *     P_m(u) = min(u/LAW_MOVES, u_m) + LAW_TAIL max(u - LAW_MOVES u_m, 0),   u_m = u_b + u_f/3
  * P_m of a cone is P.
  *
  * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on
@@ -169,7 +171,7 @@ MILD_HD int law_is_heap(const Law *law, int curves) {
     return curves & LAW_HEAP && law->cone_begin > 0;
 }
 
-/* [m] Depth from which on all of a heap's ground moves. */
+/* LAW_MOVES u_m [m], depth at which all of a heap's ground moves. */
 MILD_HD Real law_moved_depth(const Law *law) {
     return LAW_MOVES * law->cone_begin + LAW_MOVES / 3 * law->cone_depth;
 }

@@ -158,8 +158,8 @@ MILD_HD Alpha plate_alpha(const Plate *plate, int in_space, Real forward, Real l
 
 /* Adapts the law of an element to coefficients against the heading, `sideways`, and up, `downward`
  * [-]. strength: [N/m] slope for a level plate moving straight down. rate: 1/dt. */
-MILD_HD void element_yield(Element *e, const ElementMemory *memory, Real dt, Real rate,
-                           Real strength, Real sideways, Real downward, int curves) {
+MILD_HD void element_yield(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
+                           Real strength, Real sideways, Real downward) {
     /* The line of the peak starts deeper than the element has been, at least its travel deep. */
     const Real peak = RESIST_PEAK * strength;
     const Real share = real_min(real_max(downward / RESIST_PEAK, 0), 1);
@@ -215,7 +215,7 @@ MILD_HD void element_resist(Element *e, const ElementMemory *memory, const Plate
     const PlateMotion m = plate_motion(plate, vx, vy, descent);
     const Alpha sinking = plate_alpha(plate, in_space, m.forward, m.level, m.down + RESIST_REST);
     const Alpha sliding = plate_alpha(plate, in_space, m.forward, m.level + RESIST_REST, m.down);
-    element_yield(e, memory, dt, rate, strength, sliding.x, sinking.z, curves);
+    element_yield(e, memory, curves, dt, rate, strength, sliding.x, sinking.z);
 }
 
 #endif

@@ -111,8 +111,8 @@ MILD_HD Real share_least(const Share *share) {
 
 /* [-] Friction of an element at the share q of c, whose yield load is `force` [N]. slides: square
  * of its speed along the ground [m^2/s^2], of a sole in its frame. rate: 1/dt. */
-MILD_HD Real share_grip(const Element *e, const Share *share, Real q, Real c, Real force,
-                        Real slides, Real dt, Real rate) {
+MILD_HD Real share_grip(const Element *e, const Share *share, Real dt, Real rate, Real q, Real c,
+                        Real force, Real slides) {
     const Real lost = 1 - real_over(q, c);
     const Real grips = real_over(SHARE_YIELD * share->grip * lost, 1 + lost);
     const Real held = real_min(share->mu, real_max(grips, share_least(share)));
@@ -138,7 +138,7 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
     const Real force = share_force(e, q);
     /* a GPU passes by where nothing grips, a vector does not */
     const int grips = ON_GPU(share->grip > 0, 1);
-    const Real mu = grips ? share_grip(e, share, q, c, force, slides, dt, rate) : share->mu;
+    const Real mu = grips ? share_grip(e, share, dt, rate, q, c, force, slides) : share->mu;
     const Real sides = share->side * e->depth * real_max(e->depth, 0) + ahead;
     const ShareLoad load = {force, q < 1 || mu != e->mu || sides > 0};
     share->lean = c;
@@ -149,9 +149,10 @@ MILD_HD ShareLoad element_share_still(Element *e, Share *share, Real dt, Real ra
     return load;
 }
 
-/* Sets lean and q, and with them the unloading line and friction, after element_begin: the
- * line says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
- * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. */
+/* Sets lean and q, and with them the unloading line and friction, after element_begin: the line
+ * says the whole force at the yield depth. elastic: [N] force of ground without memory. level:
+ * cosine between sole and ground. ahead: [N] share_ahead of a face, 0 of a sole. slides: as in
+ * share_grip. */
 MILD_HD void element_share(Element *e, const ElementMemory *memory, Share *share, Real elastic,
                            Real dt, Real rate, Real level, Real ahead, Real slides) {
     const ShareLoad load = element_share_still(e, share, dt, rate, level, ahead, slides);
@@ -226,10 +227,10 @@ MILD_HD Real share_after(const Element *e, const Share *share, Real slid, Real f
     return real_max(share_grows(e, share) ? grown : slipped, SHARE_LEAST);
 }
 
-/* Horizontal path [m] that a step counts; adds it to what element_remember has found. Where slip
- * costs support, path counts at once where friction slides, so that the loss does not depend on the
- * step. */
-MILD_HD Real element_slide(const Element *e, const Share *share, const ElementMemory *memory,
+/* Horizontal path [m] that a step counts. Where slip costs support, path counts at once where
+ * friction slides, so that the loss does not depend on the step; so the path of `after` replaces
+ * what element_remember has found. */
+MILD_HD Real element_slide(const Element *e, const ElementMemory *memory, const Share *share,
                            ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
                            int stays) {
     const Real x = memory->pending_x + dt * vx;
@@ -276,10 +277,10 @@ MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *a
 }
 
 /* element_slide and element_wear where nothing is in vectors. */
-MILD_HD Real element_wear_alone(const Element *e, const Share *share, const ElementMemory *memory,
+MILD_HD Real element_wear_alone(const Element *e, const ElementMemory *memory, const Share *share,
                                 ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
                                 Real speed, int stays) {
-    const Real slid = element_slide(e, share, memory, after, dt, normal, vx, vy, stays);
+    const Real slid = element_slide(e, memory, share, after, dt, normal, vx, vy, stays);
     const Real fresh = element_fresh(e, dt, speed);
     if (stays && (share_slips(share, slid) || share_regains(share, slid, fresh))) {
         return element_wear(e, share, after, slid, fresh, stays);

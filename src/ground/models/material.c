@@ -103,7 +103,7 @@ const char *mild_material_preset_name(int index) {
     return index >= 0 && index < PRESETS ? presets[index].name : NULL;
 }
 
-/* Preset of mild by name, or NULL. */
+/* Preset of mild or mild_merged by name, or NULL. */
 static const Preset *find_preset(const char *name) {
     for (int i = 0; i < PRESETS; i++) {
         if (strcmp(presets[i].name, name) == 0) {

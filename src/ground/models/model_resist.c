@@ -52,7 +52,7 @@ static void some_resist(Slots *s, int i, double dt, const Plate *plate, const Mo
     const Alpha sinking = some_alpha(plate, in_space, m.forward, m.level, m.down + RESIST_REST);
     const Alpha sliding = some_alpha(plate, in_space, m.forward, m.level + RESIST_REST, m.down);
     Element element = slot_element(s, i);
-    element_yield(&element, &memory, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z, curves);
+    element_yield(&element, &memory, curves, dt, 1.0 / dt, s->strength[i], sliding.x, sinking.z);
     s->line_stiffness[i] = element.law.line_stiffness;
     slot_store(s, i, &element);
 }

@@ -209,7 +209,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
             if (wears) {
                 const Share share = slot_share(s, i);
                 slid[i] =
-                    element_slide(&element, &share, &before, &after, dt, s->iz[i], v.x, v.y, stays);
+                    element_slide(&element, &before, &share, &after, dt, s->iz[i], v.x, v.y, stays);
                 fresh[i] = element_fresh(&element, dt, v.descent);
                 const Real slips = share_slips(&share, slid[i]) ? REAL(1) : 0;
                 const Real most =
