@@ -108,6 +108,28 @@ TEST(mesh_does_not_depend_on_its_triangles) {
     mild_sole_destroy(plain);
 }
 
+/* A triangle without area, or with less than has a square, makes no element. */
+TEST(slivers_are_left_out) {
+    static const double heights[] = {0.0, 1e-200, 1e-160, 1e-120};
+    static const int triangles[6] = {0, 1, 2, 3, 4, 5};
+    for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
+        const double vertices[18] = {0, 0, 0,   1, 0, 0,   0.5, heights[i], 0,
+                                     0, 0, 0.5, 1, 0, 0.5, 0,   1,          0.5};
+        const MildShape mesh = {.type = MILD_SHAPE_MESH,
+                                .vertices = vertices,
+                                .vertex_count = 6,
+                                .triangles = triangles,
+                                .triangle_count = 2};
+        MildSole *sole = surface_make(&mesh, 1, 0.05);
+        expect_near("area", surface_area(sole), 0.5, 1e-9);
+        for (int e = 0; e < mild_sole_elements(sole); e++) {
+            expect_near("height", mild_sole_surface_z(sole)[e], 0.5, 1e-12);
+            expect_near("normal", mild_sole_surface_normal(sole, 2)[e], 1.0, 1e-12);
+        }
+        mild_sole_destroy(sole);
+    }
+}
+
 /* Parts of a body hide what lies inside them. */
 TEST(parts_that_overlap) {
     MildShape two[2] = {surface_box(0.1, 0.1, 0.1), surface_box(0.1, 0.1, 0.1)};

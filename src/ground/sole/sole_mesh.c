@@ -8,7 +8,8 @@
 #define MESH_PIECES_MAX (1 << 21)
 #define MESH_CUT 0.25   /* [-] longest edge of a piece, over the pitch */
 #define MESH_INSET 1e-3 /* [-] of a cell: a face on the border between two cells is in the inner */
-#define MESH_OPEN 1e-6  /* [-] the area vectors of a closed mesh sum to less than this share */
+#define MESH_LEAST 1e-100 /* [m^2] a triangle of less area has no normal: squares round to 0 */
+#define MESH_OPEN 1e-6    /* [-] the area vectors of a closed mesh sum to less than this share */
 
 typedef struct {
     double corner[3][3]; /* [m] */
@@ -210,7 +211,7 @@ void mesh_sample(const MildShape *mesh, double pitch, Samples *samples) {
     Samples pieces = {.most = MESH_PIECES_MAX};
     for (int t = 0; t < mesh->triangle_count && !pieces.full; t++) {
         const Triangle triangle = triangle_of(mesh, t);
-        if (triangle.area > 0.0) {
+        if (triangle.area > MESH_LEAST) {
             triangle_cut(&triangle, &cells, pitch, &pieces);
         }
     }
