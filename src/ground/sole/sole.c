@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/law/law.h"
+#include "ground/law/element_law.h"
 #include "ground/sole/sole_inside.h"
 
 /* ---- how far the cells of a plane raster are from the edge of the outline ---- */
@@ -41,16 +41,16 @@ static double edge_distance(const MildSoleDef *def, int i, double x, double y) {
     return hypot(x - p[0] - t * ex, y - p[1] - t * ey);
 }
 
-/* Lists the edges that may be nearest to a point of the cell about (x, y). Returns their count.
- * nearest: the distance of its centre. */
+/* Lists the edges that may be nearest to a point of the cell about (x, y). Returns their count. No
+ * point is further from the centre than 0.71 edges of the cell. nearest: the distance of its
+ * centre. */
 static int edges_near(const MildSoleDef *def, double x, double y, int *near, double *nearest) {
     int count = 0;
     *nearest = INFINITY;
     for (int i = 0; i < def->points; i++) {
         *nearest = fmin(*nearest, edge_distance(def, i, x, y));
     }
-    for (int i = 0; i < def->points;
-         i++) { /* no point is further from the centre than 0.71 edges */
+    for (int i = 0; i < def->points; i++) {
         if (edge_distance(def, i, x, y) <= *nearest + 1.5 * def->pitch) {
             near[count++] = i;
         }
@@ -535,7 +535,7 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
                       .width = sole->width,
                       .z = sole->z};
     /* A disc of that area. */
-    const double radius = one->pitch / sqrt(3.14159265358979323846);
+    const double radius = one->pitch / sqrt(LAW_PI);
     one->values[SOLE_EDGE] = radius / 3.0;
     one->values[SOLE_SPREAD] = radius / sqrt(18.0);
     one->values[0] = one->values[1] = 0.0;
@@ -576,7 +576,7 @@ double mild_sole_z(const MildSole *sole) {
 
 SoleHeap sole_heap(const MildSole *sole, int element) {
     const int n = sole->elements;
-    const double radius = MATERIAL_PITCH / sqrt(3.14159265358979323846);
+    const double radius = MATERIAL_PITCH / sqrt(LAW_PI);
     if (sole->shell) {
         return (SoleHeap){LAW_HEAP_LEAST, fmax(0.5 * sole->width / radius, 1.0)};
     }

@@ -26,10 +26,9 @@ struct MildSole {
 /* [m] A sole that chooses its pitch has no more elements than one of this pitch may have. */
 #define SOLE_PITCH_LEAST (0.5 * MATERIAL_PITCH)
 
-/* The heap of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes
- * from `begin` on, over `width`, times tan(alpha)/nu. The
- * elements of a shell have the cone of a disc as wide as the shell; its rim lowers their load
- * (rim.h). */
+/* The heap of an element, in radii of the disc of an element of MATERIAL_PITCH: it closes from
+ * `begin` on, over `width`, times tan(alpha)/nu. The elements of a shell have the cone of a disc as
+ * wide as the shell; its rim lowers their load (rim.h). */
 typedef struct {
     double begin; /* [-] */
     double width; /* [-] */

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ground/law/element_law.h"
 #include "ground/sole/sole.h"
 #include "ground/sole/sole_inside.h"
 
@@ -11,7 +12,6 @@
 #define SHAPE_FAR 10.0  /* [m] */
 #define SHAPE_ROUND 8   /* least elements around a circle: 8 have 2 % too much projected area */
 #define SHAPE_SKIN 1e-6 /* [m] shapes closer than this touch */
-#define SHAPE_PI 3.14159265358979323846
 
 /* Number of elements of about that pitch along a length. */
 static int divide(double length, double pitch, int least) {
@@ -41,9 +41,9 @@ static void box_sample(const MildShape *box, double pitch, Samples *samples) {
 static void ring_sample(double radius, double z, double sine, double cosine, double area,
                         double pitch, Samples *samples) {
     const double around = radius * sine;
-    const int count = divide(2.0 * SHAPE_PI * around, pitch, SHAPE_ROUND);
+    const int count = divide(2.0 * LAW_PI * around, pitch, SHAPE_ROUND);
     for (int i = 0; i < count && !samples->full; i++) {
-        const double angle = 2.0 * SHAPE_PI * (i + 0.5) / count;
+        const double angle = 2.0 * LAW_PI * (i + 0.5) / count;
         const double c = cos(angle), s = sin(angle);
         const Sample sample = {.at = {around * c, around * s, z + radius * cosine},
                                .normal = {sine * c, sine * s, cosine},
@@ -57,12 +57,12 @@ static void round_sample(double radius, double half, double pitch, Samples *samp
     const int rings = half > 0.0 ? divide(2.0 * half, pitch, 1) : 0;
     for (int i = 0; i < rings; i++) {
         const double z = 2.0 * half * ((i + 0.5) / rings - 0.5);
-        ring_sample(radius, z, 1.0, 0.0, 4.0 * SHAPE_PI * radius * half / rings, pitch, samples);
+        ring_sample(radius, z, 1.0, 0.0, 4.0 * LAW_PI * radius * half / rings, pitch, samples);
     }
-    const int bands = divide(0.5 * SHAPE_PI * radius, pitch, SHAPE_ROUND / 4);
+    const int bands = divide(0.5 * LAW_PI * radius, pitch, SHAPE_ROUND / 4);
     for (int i = 0; i < 2 * bands; i++) {
-        const double from = 0.5 * SHAPE_PI * i / bands, to = 0.5 * SHAPE_PI * (i + 1) / bands;
-        const double area = 2.0 * SHAPE_PI * radius * radius * (cos(from) - cos(to));
+        const double from = 0.5 * LAW_PI * i / bands, to = 0.5 * LAW_PI * (i + 1) / bands;
+        const double area = 2.0 * LAW_PI * radius * radius * (cos(from) - cos(to));
         const double middle = 0.5 * (from + to);
         ring_sample(radius, i < bands ? half : -half, sin(middle), cos(middle), area, pitch,
                     samples);
