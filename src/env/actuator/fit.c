@@ -315,8 +315,14 @@ static MildStatus fit_all(Work *work, int kinds, const int *kind, Pool *pool, Mi
     }
     pool_run(pool, kinds, fit_kind, work);
     for (int k = 0; k < kinds; k++) {
-        if (work[k].failed || !isfinite(work[k].score->network)) {
+        if (work[k].failed) {
             return mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
+        }
+        if (!isfinite(work[k].score->network)) {
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "actuator: the training of joints with a motor as %s's diverged; look "
+                             "at the units of the log",
+                             robot_joint_name(work[k].record->robot, work[k].score->joint));
         }
     }
     return MILD_OK;
