@@ -95,10 +95,10 @@ typedef struct {
                             mild_batch_stride, a depth of -1000 and no force. On uneven ground
                             the depth that the law takes (docs/model.md section 6). NULL where a
                             sole is a shell */
-    float *
-        residual; /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air; NaN where
-                            a number of the problem or of the results is none, or a rotation turns
-                            nothing: the ground then remembers what it did before */
+    /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air; NaN where a number of
+     * the problem or of the results is none, or a rotation turns nothing: the ground then remembers
+     * what it did before. */
+    float *residual;
     int32_t *iterations; /* [robots] Newton steps; 0 in the air */
 } MildBatchOutput;
 

@@ -42,8 +42,8 @@ typedef struct {
 typedef struct {
     Real jacobian[ENGINE_FEET][ENGINE_CHAIN][6]; /* J^T: twist per degree of freedom, by place */
     Real half[ENGINE_FEET][ENGINE_CHAIN][6];     /* L^-T J^T with M = L^T L */
-    Real free_velocity[ENGINE_FEET]
-                      [6]; /* [m/s, rad/s] V_free: twists after a step without ground */
+    /* [m/s, rad/s] V_free: twists after a step without ground. */
+    Real free_velocity[ENGINE_FEET][6];
     /* From here on it is not needed between engine_begin and engine_end. */
     alignas(16) union {
         Real inverse_inertia[6 * ENGINE_FEET * 6 * ENGINE_FEET]; /* A = J M^-1 J^T, row major with
