@@ -89,12 +89,13 @@ int mesh_contains(const MildShape *mesh, const double point[3]) {
     static const double ray[3] = {0.5377, 0.2163, 0.8149};
     int inside = 0;
     for (int t = 0; t < mesh->triangle_count; t++) {
-        const Triangle triangle = triangle_of(mesh, t);
+        const int *vertex = &mesh->triangles[3 * t];
+        const double *corner = &mesh->vertices[3 * vertex[0]];
         double e1[3], e2[3], from[3], p[3], q[3];
         for (int k = 0; k < 3; k++) {
-            e1[k] = triangle.corner[1][k] - triangle.corner[0][k];
-            e2[k] = triangle.corner[2][k] - triangle.corner[0][k];
-            from[k] = point[k] - triangle.corner[0][k];
+            e1[k] = mesh->vertices[3 * vertex[1] + k] - corner[k];
+            e2[k] = mesh->vertices[3 * vertex[2] + k] - corner[k];
+            from[k] = point[k] - corner[k];
         }
         cross(ray, e2, p);
         cross(from, e1, q);

@@ -95,10 +95,16 @@ static void frame_turn(const Frame *frame, const double *in, double *out) {
     }
 }
 
-/* Bool: a point of the body lies inside a shape. */
+/* Bool: the shape has an inside. */
+static int shape_closed(const MildShape *shape) {
+    double volume;
+    return shape->type != MILD_SHAPE_MESH || mesh_closed(shape, &volume);
+}
+
+/* Bool: a point of the body lies inside a shape that has an inside. */
 static int shape_contains(const MildShape *shape, const double point[3]) {
     const Frame frame = frame_of(shape);
-    double at[3], volume;
+    double at[3];
     for (int k = 0; k < 3; k++) {
         at[k] = 0.0;
         for (int j = 0; j < 3; j++) {
@@ -110,7 +116,7 @@ static int shape_contains(const MildShape *shape, const double point[3]) {
                fabs(at[2]) < shape->size[2];
     }
     if (shape->type == MILD_SHAPE_MESH) {
-        return mesh_closed(shape, &volume) && mesh_contains(shape, at);
+        return mesh_contains(shape, at);
     }
     const double half = shape->type == MILD_SHAPE_CAPSULE ? shape->size[1] : 0.0;
     const double z = fmax(fabs(at[2]) - half, 0.0);
@@ -118,15 +124,15 @@ static int shape_contains(const MildShape *shape, const double point[3]) {
 }
 
 /* Bool: the element lies inside another shape. Of two faces that coincide the first shape's stays,
- * and none where they face each other. */
-static int sample_hidden(const MildSurfaceDef *def, const Sample *sample) {
+ * and none where they face each other. closed: [count] shape_closed. */
+static int sample_hidden(const MildSurfaceDef *def, const int *closed, const Sample *sample) {
     for (int other = 0; other < def->count; other++) {
         double out[3], in[3];
         for (int k = 0; k < 3; k++) {
             out[k] = sample->at[k] + SHAPE_SKIN * sample->normal[k];
             in[k] = sample->at[k] - SHAPE_SKIN * sample->normal[k];
         }
-        if (other != sample->key &&
+        if (closed[other] && other != sample->key &&
             (shape_contains(&def->shapes[other], out) ||
              (other < sample->key && shape_contains(&def->shapes[other], in)))) {
             return 1;
@@ -139,7 +145,8 @@ static double spacing_of(const MildSurfaceDef *def) {
     return def->spacing > 0.0 ? def->spacing : def->pitch;
 }
 
-static void shape_sample(const MildSurfaceDef *def, int index, Samples *samples) {
+static void shape_sample(const MildSurfaceDef *def, const int *closed, int index,
+                         Samples *samples) {
     const double spacing = spacing_of(def);
     const MildShape *shape = &def->shapes[index];
     const Frame frame = frame_of(shape);
@@ -161,7 +168,7 @@ static void shape_sample(const MildSurfaceDef *def, int index, Samples *samples)
         for (int k = 0; k < 3; k++) {
             sample->at[k] += frame.at[k];
         }
-        kept += !sample_hidden(def, sample);
+        kept += !sample_hidden(def, closed, sample);
     }
     samples->count = kept;
 }
@@ -287,8 +294,12 @@ MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error) {
     }
     Samples samples = {.most = SOLE_ELEMENTS_MAX};
     MildSole *sole = NULL;
+    int closed[SHAPES_MAX];
     for (int i = 0; i < def->count; i++) {
-        shape_sample(def, i, &samples);
+        closed[i] = shape_closed(&def->shapes[i]);
+    }
+    for (int i = 0; i < def->count; i++) {
+        shape_sample(def, closed, i, &samples);
     }
     if (samples.full) {
         mild_fail(error, MILD_ERROR_RANGE,
