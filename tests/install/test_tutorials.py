@@ -190,6 +190,8 @@ def main():
     parser.add_argument("page", nargs="?", default="README")
     parser.add_argument("--keep", type=pathlib.Path, help="work in this folder, which stays")
     args = parser.parse_args()
+    if args.mild and not args.package:
+        parser.error("package is missing")
     with tempfile.TemporaryDirectory() as folder:
         try:
             check_itself()

@@ -1,6 +1,6 @@
 """Walks without a network: sampling MPC over the batch engine. Every 20 ms the plant's state is put into thousands of environments, which
-try different plans of joint targets for half a second; the best ones are averaged (predictive sampling, CEM or MPPI, by `elite` and
-`temperature`), the first 20 ms are done, and the plan is shifted.
+try different plans of joint targets for half a second, around those of a gait or (--policy) of a policy; the best ones are averaged
+(predictive sampling, CEM or MPPI, by `elite` and `temperature`), the first 20 ms are done, and the plan is shifted.
 
     python examples/python/plan/plan.py --robot go1 --ground foam45 --device cuda --samples 2048
 
@@ -282,7 +282,7 @@ def main():
             ("believes", "", "the ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
             ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
             ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
-            ("policy", "", "a policy's file, whose actions take the gait's place"),
+            ("policy", "", "a policy's file: plans are offsets from its actions, in the gait's place"),
             ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
         parser.add_argument("--" + name, type=type(default), default=default, help=words)
     given = parser.parse_args()

@@ -320,8 +320,8 @@ static MildStatus fit_all(Work *work, int kinds, const int *kind, Pool *pool, Mi
         }
         if (!isfinite(work[k].score->network)) {
             return mild_fail(error, MILD_ERROR_RANGE,
-                             "actuator: the training of joints with a motor as %s's diverged; look "
-                             "at the units of the log",
+                             "actuator: the training for %s and joints like it diverged; look at "
+                             "the units of the log",
                              robot_joint_name(work[k].record->robot, work[k].score->joint));
         }
     }
