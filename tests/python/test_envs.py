@@ -16,6 +16,7 @@ from mild import envs, gym
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "examples/python" / part) for part in ("", "plan")]
+import gait  # noqa: E402
 import plan  # noqa: E402
 import policy  # noqa: E402
 
@@ -219,20 +220,32 @@ class Plan(unittest.TestCase):
 
     def test_walks(self):
         """A plan of few samples keeps the Go1 up, and goes forward; the policy of another robot is refused."""
-        given = argparse.Namespace(robot="go1", ground="foam45", believes="rigid", speed=0.5, seconds=0.6, samples=6, trials=2, seed=1, device="cpu",
+        given = argparse.Namespace(robot="go1", ground="foam45", believes="rigid", speed=0.5, seconds=1.5, samples=6, trials=2, seed=1, device="cpu",
                                    threads=1, policy="")
         numbers = json.loads((ROOT / "examples/python/plan/plan.json").read_text())["go1"]
         result, path = plan.walk(given, numbers, log=None)
-        self.assertEqual((result["upright"], path.shape), (2, (60, 2, 19)))
-        self.assertTrue(all(0.1 < trial["forward"] < 0.4 for trial in result["trials"]), result)
+        self.assertEqual((result["upright"], path.shape), (2, (150, 2, 19)))
+        self.assertTrue(all(0.5 < trial["forward"] < 0.9 for trial in result["trials"]), result)
         given.policy = str(ROOT / "policies/g1.safetensors")
-        with self.assertRaisesRegex(SystemExit, "g1.safetensors is not a policy of go1"):
+        with self.assertRaisesRegex(ValueError, "g1.safetensors is not a policy of go1"):
             plan.walk(given, numbers, log=None)
+
+    def test_mirror(self):
+        """Half a period later each joint does what its mirror image did."""
+        for robot, numbers in json.loads((ROOT / "examples/python/plan/plan.json").read_text()).items():
+            ini = gait.robot_ini(ROOT / "robots" / robot / "robot.ini")
+            joints, mirror = (ini["joints"][key].split() for key in ("names", "mirror"))
+            sign, phase = np.array(ini["joints"]["mirror_sign"].split(), float), np.linspace(-1, 1, 23)
+            walk = gait.Gait(ini, numbers["gait"], 0.5)
+            (now, swings), (later, swing_later) = walk.actions(phase), walk.actions(phase + 0.5)
+            image = [joints.index(name) for name in mirror]
+            np.testing.assert_allclose(later, sign * now[:, image], atol=1e-9, err_msg=robot)
+            np.testing.assert_array_equal(swing_later, swings[:, image])
 
     def test_policy(self):
         """Over histories of an environment the planner's policy does what the policy of one frame after the other does."""
         path = ROOT / "policies/go1.safetensors"
-        ours, one = plan.Policy(plan.Arrays("cpu"), str(path), "go1"), policy.Policy(path)
+        ours, one = gait.Policy(plan.Arrays("cpu"), str(path), "go1"), policy.Policy(path)
         robots = plan.Robots(plan.Arrays("cpu"), 1, "go1", {**plan.KEYS, **ours.keys}, "cpu", 1, 1)
         for _ in range(60):
             action = ours.act(np.array(robots.history))

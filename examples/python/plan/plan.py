@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 
-from gait import Gait, robot_ini
+from gait import Gait, Policy, robot_ini
 from mild.envs import open_envs
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -112,35 +112,6 @@ class Robots:
 def yaw_of(xp, qpos):
     w, x, y, z = (qpos[:, 3 + i] for i in range(4))
     return xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-
-
-class Policy:
-    """A learned policy (docs/policy.md), whose actions plans then are offsets from."""
-
-    def __init__(self, arrays, path, robot):
-        sys.path.append(str(HERE.parent))
-        import policy
-        tensors, self.task = policy.read(path)
-        if self.task.pop("robot") != robot:
-            sys.exit(f"plan: {path} is not a policy of {robot}")
-        self.xp, self.tensors = arrays.xp, {name: arrays.of(values) for name, values in tensors.items()}
-        self.keys = {f"task.{key}": value for key, value in self.task.items() if key != "velocity_scale"}
-
-    def network(self, name, x):
-        layers = sorted(int(key.split(".")[1]) for key in self.tensors if key.startswith(name) and key.endswith("weight"))
-        for i in layers:
-            x = x @ self.tensors[f"{name}.{i}.weight"].T + self.tensors[f"{name}.{i}.bias"]
-            x = x if i == layers[-1] else self.xp.where(x > 0, x, self.xp.exp(self.xp.clip(x, None, 0)) - 1)
-        return x
-
-    def act(self, history):
-        frame, heads = history[:, -1], self.network("encoder", history.reshape(len(history), -1))
-        n = 2 * (self.tensors["actor.0.weight"].shape[1] - frame.shape[1]) - heads.shape[1]
-        seen = self.xp.concatenate([heads[:, 3:n], frame[:, -2:]], 1)
-        theta = self.network("modulation", seen[:, : self.tensors["modulation.0.weight"].shape[1]])
-        half = theta.shape[1] // 2
-        z = theta[:, :half] * heads[:, n : (n + heads.shape[1]) // 2] + theta[:, half:]
-        return self.network("actor", self.xp.concatenate([frame, heads[:, :n], z], 1))
 
 
 class Planner:
@@ -286,7 +257,13 @@ def main():
             ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
         parser.add_argument("--" + name, type=type(default), default=default, help=words)
     given = parser.parse_args()
-    result, path = walk(given, json.loads(pathlib.Path(given.numbers).read_text())[given.robot])
+    try:
+        numbers = json.loads(pathlib.Path(given.numbers).read_text())
+        if given.robot not in numbers:
+            parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(numbers)}")
+        result, path = walk(given, numbers[given.robot])
+    except (ImportError, OSError, ValueError) as error:
+        sys.exit(f"plan: {error}")
     if given.path:
         np.save(given.path, path)
     print(json.dumps(result))
