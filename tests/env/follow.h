@@ -228,13 +228,25 @@ static double forces_apart(int e) {
     return most;
 }
 
+/* Largest difference of the newest frames. */
+static double frames_apart(int e) {
+    const TaskShape *shape = &pair.shape;
+    const int newest = e * shape->history + (TASK_FRAMES - 1) * shape->observation;
+    double most = 0;
+    for (int i = newest; i < newest + shape->observation; i++) {
+        most = fmax(most, fabs((double)pair.a.history[i] - (double)pair.b.history[i]));
+    }
+    return most;
+}
+
 /* Robots that stagger under random actions, fall and begin again. Within float's rounding as long
  * as a robot has not been thrown: legs that swing freely against their limits double a difference
  * within a few steps, so that an environment is left alone once it differs, until its next
  * episode; a share of `least` of the steps is before that. In resistive force theory the force
  * jumps where a sole begins to move at 4 mm/s, in three dimensions also where it comes to face its
  * motion (plate.h), and rounding decides in which step. So does that of ground that creates energy,
- * where an element leaves virgin ground. */
+ * where an element leaves virgin ground. There an environment that a jump has moved, also one that
+ * is over by the end of the step, is left alone, too. */
 static void follow(const char *robot, TaskDef def, int device, const MildMapDef *on, double least) {
     const int model = def.randomize.model;
     const int jumps =
@@ -258,7 +270,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         for (int e = 0; e < ENVS; e++) {
             const double gap = fabs((double)(pair.a.reward[e] - pair.b.reward[e]));
             const int same = pair.a.done[e] == pair.b.done[e];
-            apart[e] |= !(gap < 1e-5) || !same || (jumps && forces_apart(e) > 1e-2);
+            apart[e] |= !(gap < 1e-5) || !same ||
+                        (jumps && fmax(forces_apart(e), frames_apart(e)) > 1e-2);
             steps++;
             together += !apart[e];
             done += pair.b.done[e];
