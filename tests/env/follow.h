@@ -270,8 +270,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         for (int e = 0; e < ENVS; e++) {
             const double gap = fabs((double)(pair.a.reward[e] - pair.b.reward[e]));
             const int same = pair.a.done[e] == pair.b.done[e];
-            apart[e] |= !(gap < 1e-5) || !same ||
-                        (jumps && fmax(forces_apart(e), frames_apart(e)) > 1e-2);
+            apart[e] |=
+                !(gap < 1e-5) || !same || (jumps && fmax(forces_apart(e), frames_apart(e)) > 1e-2);
             steps++;
             together += !apart[e];
             done += pair.b.done[e];
