@@ -70,12 +70,13 @@ walk() {
         "select='eq(n,40)+eq(n,109)+eq(n,150)+eq(n,205)+eq(n,255)+eq(n,300)',scale=640:-1:flags=area,tile=3x2"
 }
 
-# The README's moving picture: eight seconds over rubber, foam and sand, with imprints and the pressure under the soles.
+# The README's moving picture: a walk of seven seconds over rubber, foam and sand, then the G1 runs on sand; imprints, sole pressures.
 motion() {
-    "$mild" play --ground rubber,foam45,sand_loose --patch 1.8 --speed 0.7 --seconds 9 --terrain.memory=true \
-        --width 1280 --height 720 --video "$work/motion.mp4"
-    ffmpeg -loglevel error -y -ss 1 -t 8 -i "$work/motion.mp4" -vf "scale=640:-1:flags=area" \
-        -c:v libwebp_anim -loop 0 -q:v 50 -compression_level 4 docs/walk.webp
+    local picture=(--terrain.memory=true --width 1280 --height 720 --video)
+    "$mild" play --ground rubber,foam45,sand_loose --patch 1.6 --speed 0.7 --seconds 8 "${picture[@]}" "$work/motion.mp4"
+    "$mild" play --robot g1 --policy policies/g1_run.safetensors --ground sand_loose --speed 2.8 --seconds 6 "${picture[@]}" "$work/sand.mp4"
+    ffmpeg -loglevel error -y -ss 1 -t 7 -i "$work/motion.mp4" -ss 2 -t 3.4 -i "$work/sand.mp4" \
+        -filter_complex "[0][1]concat,scale=640:-1:flags=area" -c:v libwebp_anim -loop 0 -q:v 45 -compression_level 4 docs/walk.webp
 }
 
 # The other robots, a moment of each.

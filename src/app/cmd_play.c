@@ -20,6 +20,7 @@
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
+#define AREA_ASIDE 0.2    /* [m] aside, for each metre of it: nobody holds the heading */
 #define WINDOW_AREA 12.0  /* [m] ground drawn around the start of a window's walk */
 #define COURSE_EXTRA 3.0  /* [s] a course gets for starting and stopping */
 #define COURSE_LEAST 12.0 /* [s] */
@@ -173,6 +174,7 @@ static MildStatus make_view(Command *c, MildError *error) {
     def.window = play->window;
     def.x_min = play->window ? -WINDOW_AREA : fmin(reach, 0) - AREA_MARGIN;
     def.x_max = play->window ? WINDOW_AREA : fmax(reach, 0) + AREA_MARGIN;
+    def.y_min -= AREA_ASIDE * fabs(reach), def.y_max += AREA_ASIDE * fabs(reach);
     if (play->window) {
         def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
     }
