@@ -5,10 +5,10 @@
   lab/paper/exam.py --out out/exam --policy runs/mine/policy.safetensors --trials 2 --parts nine,slip,snow
   lab/paper/exam.py --out out/g1 -- --robot g1           # policies/g1.safetensors as configs/g1.ini says, at the speeds of its training
 
-Prints a line for each part: the trials that stay upright; the cells (a ground, a speed) within 5 % of the command, and the one that is
-furthest from it; the cost of transport; the largest torque of any trial; the largest change of a joint's target in 10 ms; the least
-distance of the legs, and where; what ended the other trials, and where. OUT/exam.json has the rows of `mild eval`, each with the error
-of its speed [m/s]. Options after -- go to every `mild eval`."""
+Prints a line for each part: the trials that stay upright; the cells (a ground, a speed) within 5 % of the command, the mean share of it
+that they have, and the one that is furthest from it; the cost of transport; the largest torque of any trial; the largest change of a
+joint's target in 10 ms; the least distance of the legs, and where; what ended the other trials, and where. OUT/exam.json has the rows of
+`mild eval`, each with the error of its speed [m/s]. Options after -- go to every `mild eval`."""
 import argparse
 import concurrent.futures
 import configparser
@@ -145,14 +145,15 @@ def summary(rows):
     costs = [c["cot"] for c in cells if c["cot"] is not None]
     legs = min(((c["legs"], *c["where"]) for c in cells if c["legs"] is not None), default=None)
     return {"upright": sum(c["upright"] for c in cells), "trials": sum(c["trials"] for c in cells), "ends": ends,
-            "within": len(good), "asked": len(asked), "worst": list(max(off)[1:]) if off else None,
+            "within": len(good), "asked": len(asked), "share": sum(is_ / command for _, _, command, is_ in off) / len(off) if off else None,
+            "worst": list(max(off)[1:]) if off else None,
             "cot": [min(costs), max(costs)] if costs else None, "torque": max(c["torque"] for c in cells),
             "target_jump": max((c["target_jump"] for c in cells if c["target_jump"] is not None), default=None),
             "legs": legs and legs[0], "legs_at": legs and list(legs[1:]),
             "fell": [[*c["where"], c["trials"] - c["upright"]] for c in cells if c["upright"] < c["trials"]]}
 
 
-HEAD = f"{'':32} {'upright':>12} {'within 5 %':>10} {'furthest from the command [m/s]':44} {'cost':14} {'torque':>8} {'jump':>8} {'legs':>7}"
+HEAD = f"{'':32} {'upright':>12} {'within 5 %':>10} {'mean':>5} {'furthest from the command [m/s]':44} {'cost':14} {'torque':>8} {'jump':>8} {'legs':>7}"
 
 
 def line(what, s):
@@ -162,8 +163,8 @@ def line(what, s):
     legs = "-" if s["legs"] is None else f"{1e3 * s['legs']:4.0f} mm on {s['legs_at'][0]}@{s['legs_at'][1]:g}"
     ends = "".join(f", {n} {end}" for end, n in s["ends"].items())
     where = ", ".join(f"{g}@{v:g}:{n}" for g, v, n in s["fell"][:6])
-    within = f"{s['within']}/{s['asked']}"
-    return f"{what:32} {s['upright']:4} of {s['trials']:<4} {within:>10} {worst:44} {cost:14} {s['torque']:4.0f} N m {jump:>8} {legs}{ends} {where}".rstrip()
+    within, share = f"{s['within']}/{s['asked']}", "-" if s["share"] is None else f"{100 * s['share']:.0f} %"
+    return f"{what:32} {s['upright']:4} of {s['trials']:<4} {within:>10} {share:>5} {worst:44} {cost:14} {s['torque']:4.0f} N m {jump:>8} {legs}{ends} {where}".rstrip()
 
 
 # ---- the command ----
