@@ -74,7 +74,7 @@ static void begin_episode(Runner *r) {
     task_env_draw(r->env, &r->task, r->def.robot);
     task_begin_episode(r->env, &r->task, robot_table(r->def.robot), 0, 0);
     r->env->phase = 0;
-    r->hold = (SpeedHold){.cycles = 0};
+    r->hold = (SpeedHold){.cycles = {0}};
 }
 
 Runner *runner_create(const RunnerDef *def, MildError *error) {

@@ -153,7 +153,7 @@ static void start(PlayWalk *walk) {
     Play *play = walk->play;
     EnvsView none = {0};
     belief_reset(&play->knows);
-    walk->hold = (SpeedHold){.cycles = 0};
+    walk->hold = (SpeedHold){.cycles = {0}};
     set_command(walk);
     task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
                       play->scene->rigid, &none);

@@ -10,6 +10,7 @@ typedef struct {
     SpeedHoldDef def;
     SpeedHold hold;
     double factor;      /* speed over command, of both directions */
+    double turned;      /* the same of turning */
     double sway, noise; /* [m/s] of the estimate */
     double wanted[3], command[3];
     int step;
@@ -19,6 +20,7 @@ typedef struct {
 static Walker walker_at(double wanted, double factor) {
     return (Walker){.def = {.gain = 0.1, .scale = 4, .clock = CLOCK},
                     .factor = factor,
+                    .turned = 0.8,
                     .wanted = {wanted},
                     .command = {wanted},
                     .random = random_at(7, 0, 0)};
@@ -35,6 +37,7 @@ static void walk(Walker *w, int steps) {
                              w->noise * (2 * random_unit(&w->random) - 1);
             estimates[i] = (float)(w->def.scale * v);
         }
+        frame[2] = (float)(w->turned * w->command[2] + w->sway * sin(phase));
         memcpy(w->command, w->wanted, sizeof w->command);
         speed_hold(&w->hold, &w->def, frame, estimates, w->command);
         w->step++;
@@ -57,13 +60,13 @@ TEST(a_slow_walk_comes_to_its_speed) {
 /* The factor is the same in each cycle; its weight grows. */
 TEST(doubt_ends_after_a_few_cycles) {
     Walker w = walker_at(0.5, 0.9);
-    while (w.hold.cycles == 0) {
+    while (w.hold.cycles[SPEED_HOLD_WAY] == 0) {
         walk(&w, 1);
     }
     for (int n = 1; n <= 5; n++) {
         const double weight = n * n / (n * n + 1.0);
         expect_near("ratio", w.hold.ratio[0], 1 / (1 - 0.1 * weight) - 1, 0.002);
-        assert_int_equal(w.hold.cycles, n);
+        assert_int_equal(w.hold.cycles[SPEED_HOLD_WAY], n);
         walk(&w, CYCLE);
     }
 }
@@ -74,6 +77,30 @@ TEST(sideways_is_held_too) {
     walk(&w, CYCLE * 60);
     expect_near("ratio forward", w.hold.ratio[0], 1 / 0.9 - 1, 1e-3);
     expect_near("ratio left", w.hold.ratio[1], 1 / 0.9 - 1, 1e-3);
+}
+
+TEST(a_turn_is_held_by_the_gyro) {
+    Walker w = walker_at(0.4, 0.9);
+    w.wanted[1] = w.command[1] = 0.2;
+    w.wanted[2] = w.command[2] = -0.8;
+    w.sway = 0.3;
+    walk(&w, CYCLE * 60);
+    expect_near("turn", w.turned * w.command[2], -0.8, 0.01);
+    assert_true(w.command[0] == 0.4 && w.command[1] == 0.2); /* it turns fast */
+    w.turned = 0.6;
+    walk(&w, CYCLE * 60);
+    expect_near("bound", w.command[2], -0.8 * 1.4, 1e-12);
+}
+
+/* Who holds a heading turns otherwise in each step: no turn is learned, and the way is. */
+TEST(steering_disturbs_no_speed) {
+    Walker w = walker_at(0.4, 0.9);
+    for (int k = 0; k < 20 * CYCLE; k++) {
+        w.wanted[2] = 0.3 * sin(0.2 * k);
+        walk(&w, 1);
+    }
+    expect_near("speed", w.factor * w.command[0], 0.4, 1e-3);
+    assert_true(w.hold.ratio[2] == 0);
 }
 
 TEST(the_ratio_is_bounded) {
@@ -134,7 +161,7 @@ TEST(standing_forgets) {
     walk(&w, CYCLE * 10);
     assert_true(w.hold.ratio[0] != 0);
     speed_hold(&w.hold, &w.def, frame, estimates, command);
-    assert_true(w.hold.ratio[0] == 0 && w.hold.cycles == 0);
+    assert_true(w.hold.ratio[0] == 0 && w.hold.cycles[SPEED_HOLD_WAY] == 0);
     assert_true(command[0] == 0 && command[1] == 0 && command[2] == 0.3);
 }
 

@@ -109,7 +109,7 @@ TEST(the_same_as_the_task) {
  * task's own frames. */
 TEST(the_speed_is_held_as_in_the_task) {
     const EnvsView none = {0};
-    SpeedHold hold = {.cycles = 0};
+    SpeedHold hold = {.cycles = {0}};
     World w = make_world();
     noisy.speed_hold = 0.1;
     const SpeedHoldDef held = speed_hold_def(&noisy, robot, &w.controller);

@@ -231,8 +231,8 @@ const MildField task_fields[] = {
       "[m/s] forward speed up to which the share is a walk's and from which it is a run's, linear "
       "between"),
     T(speed_hold, D, 1, 0, 1,
-      "[-] eval, play and drive correct the commanded speed by the policy's own estimate of it: "
-      "least weight of a gait cycle; 0: not at all"),
+      "[-] eval, play and drive correct the commanded speed by the policy's own estimate of it, "
+      "and the turn by the gyro: least weight of a gait cycle; 0: not at all"),
     T(swing_apex, D, 1, 0.01, 0.4,
       "[m] height of the swing foot above the undisturbed surface that the clock asks for"),
     T(double_support, D, 1, 0, 1,
