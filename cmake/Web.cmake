@@ -26,5 +26,7 @@ endfunction()
 web_robot(sa01 sa01 mild walk)
 web_robot(g1 g1 g1 g1)
 web_robot(g1 g1_run g1_run g1_run)
+web_robot(g1 g1_jump g1_jump g1_jump)
 web_robot(go1 go1 go1 go1)
-add_custom_target(web_robots DEPENDS ${web_robots}/sa01.bin ${web_robots}/g1.bin ${web_robots}/g1_run.bin ${web_robots}/go1.bin)
+add_custom_target(web_robots DEPENDS ${web_robots}/sa01.bin ${web_robots}/g1.bin ${web_robots}/g1_run.bin ${web_robots}/g1_jump.bin
+  ${web_robots}/go1.bin)

@@ -166,11 +166,11 @@ def drive(browser):
     fetched = "performance.getEntriesByType('resource').filter((e) => /bin$/.test(e.name)).map((e) => e.name.split('/').pop()).join()"
     if browser.value(fetched) != "sa01.bin":
         wrong.append(f"before another robot is chosen {browser.value(fetched)} is fetched")
-    for button, name, feet in [(1, "g1", 2), (2, "go1", 4), (3, "g1_run", 2), (0, "sa01", 2)]:
+    for button, name, feet in [(1, "g1", 2), (2, "go1", 4), (3, "g1_run", 2), (4, "g1_jump", 2), (0, "sa01", 2)]:
         browser.value(f"document.querySelectorAll('#robots button')[{button}].click(); app.script = () => [0.55, 0, 0]")
         if not browser.wait(f"app.robot === {button} && app.core.view().feet === {feet} && app.core.view().link[3] > 0.6 && !app.fallen", 30):
             wrong.append(f"{name} does not walk when it is chosen")
-    if browser.value(fetched) != "sa01.bin,g1.bin,go1.bin,g1_run.bin":
+    if browser.value(fetched) != "sa01.bin,g1.bin,go1.bin,g1_run.bin,g1_jump.bin":
         wrong.append(f"{browser.value(fetched)} are fetched, and not each robot once")
     return wrong
 

@@ -347,12 +347,12 @@ static void lift_feet(void) {
     solve_ground();
 }
 
-int web_move(const float *action, const float command[3]) {
+int web_move(const float *action, const float command[TASK_COMMANDS]) {
     TaskEnv *env = web_env();
     const int steps = env_physics_steps(&web.task);
     const EnvsView view = {.history = web.history};
     const int floor = web.trial.rigid && web.standing > web.feet;
-    memcpy(env->command, command, 3 * sizeof *command);
+    memcpy(env->command, command, sizeof env->command);
     web.call.action = action;
     for (int k = 0; k <= steps; k++) {
         if (k > 0 && !web.trial.rigid) {
@@ -395,8 +395,8 @@ static void look_at_ground(void) {
     }
 }
 
-int web_step(float vx, float vy, float wz) {
-    const float command[3] = {vx, vy, wz};
+int web_step(float vx, float vy, float wz, float rise) {
+    const float command[TASK_COMMANDS] = {vx, vy, wz, rise};
     float action[ROBOT_JOINTS_MAX];
     look_at_ground();
     web_act(web.history, action);

@@ -161,9 +161,9 @@ const char *web_start(int ground, int relief, int prints);
 void web_again(void);
 /* Changes the ground while the robot walks: factor of stiffness, factor of friction [-]. */
 void web_change(double stiffness, double friction);
-/* A policy step of 10 ms with a command [m/s, m/s, rad/s]. Returns why the trial has ended, a
- * TaskEnd; 0: it has not. */
-int web_step(float vx, float vy, float wz);
+/* A policy step of 10 ms with a command [m/s, m/s, rad/s] and, for a robot that jumps, the rise of
+ * each jump [m]; 0: none. Returns why the trial has ended, a TaskEnd; 0: it has not. */
+int web_step(float vx, float vy, float wz, float rise);
 WebView *web_view(void);
 /* The number of the robot's parts, and behind it the parts (WebModel.geom). */
 const int32_t *web_picture(void);
@@ -180,7 +180,7 @@ const float *web_history(void);
 /* Action for a history. */
 void web_act(const float *history, float *action);
 /* The same with a given action, but for the picture. */
-int web_move(const float *action, const float command[3]);
+int web_move(const float *action, const float command[TASK_COMMANDS]);
 /* The picture of the present. */
 void web_show(void);
 

@@ -7,14 +7,17 @@ const BEHIND = 1.5; // [s] the most that is made good after a pause
 const TICK = 20; // [ms] between steps where drawing takes longer
 const STRIPE = 2.4; // [m] WEB_STRIPE
 const LEVEL = 0;
+const JUMP_STANCE = 0.6, GRAVITY = 9.81; // [s, m/s^2] of a jump's clock: docs/task.md, section 7
 
 // The robots: the file, the name; what it is asked at most, within what its policy was trained for: forward, backward, aside [m/s], turn
-// [rad/s]; the end of the pressures' scale [Pa]; how far away the camera is, and how far below the base it looks [m].
+// [rad/s]; the end of the pressures' scale [Pa]; how far away the camera is, and how far below the base it looks [m]. Where it jumps: the
+// rise [m] in place and under way.
 const ROBOTS = [
   { file: 'sa01', name: 'SA01', most: [1.15, 0.9, 0.35, 1.0], pressure: 40e3, away: 3, below: 0.33 },
   { file: 'g1', name: 'G1', most: [0.9, 0.4, 0.2, 0.8], pressure: 80e3, away: 3.4, below: 0.15 },
   { file: 'go1', name: 'Go1', most: [1.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 2.2, below: 0.11 },
   { file: 'g1_run', name: 'running G1', most: [3.0, 0.4, 0.2, 0.8], pressure: 120e3, away: 4.4, below: 0.15 },
+  { file: 'g1_jump', name: 'jumping G1', most: [0.7, 0.2, 0.1, 0.5], pressure: 120e3, away: 4.4, below: 0.15, rises: [0.4, 0.2] },
 ];
 
 // What a ground is called, and its colour as drawn.
@@ -157,17 +160,22 @@ class Driver {
     this.command = [0, 0, 0];
     this.heading = null;
     this.most = ROBOTS[0].most;
+    this.jumps = false; // a jump in place is asked for
+    this.jump = { rise: 0, left: 0 }; // the present one [m, s]
     this.touched = false; // somebody has driven
     this.again = false; // somebody wants it to stand up
     addEventListener('keydown', (e) => {
       if (e.target.tagName === 'INPUT' && e.key.startsWith('Arrow')) return;
       this.keys.add(e.code);
+      if (e.code === 'Space' && !e.repeat) this.hop();
       if (e.code.startsWith('Arrow') || e.code === 'Space') e.preventDefault();
     });
     addEventListener('keyup', (e) => this.keys.delete(e.code));
     addEventListener('blur', () => this.keys.clear());
     this.followStick($('stick'));
   }
+
+  hop() { if (this.rises) this.jumps = this.touched = true; }
 
   followStick(stick) {
     const knob = stick.firstElementChild, move = (e) => {
@@ -178,7 +186,7 @@ class Driver {
       this.stick = [y, x];
       knob.style.transform = `translate(${x * 40}px, ${-y * 40}px)`;
     };
-    stick.addEventListener('pointerdown', (e) => { stick.setPointerCapture(e.pointerId); move(e); });
+    stick.addEventListener('pointerdown', (e) => { stick.setPointerCapture(e.pointerId); this.hop(); move(e); });
     stick.addEventListener('pointermove', (e) => { if (e.pressure > 0 || e.buttons) move(e); });
     for (const end of ['pointerup', 'pointercancel']) {
       stick.addEventListener(end, () => { this.stick = [0, 0]; knob.style.transform = ''; });
@@ -201,14 +209,32 @@ class Driver {
     return [clamp(forward, -1, 1), clamp(left, -1, 1), clamp(turn, -1, 1)];
   }
 
-  // The command of the next policy step [m/s, m/s, rad/s]: gentle changes, and the heading held where nobody turns.
+  // [m] The rise of the next policy step, 0: none. Every command of a robot that jumps is a jump, and one that has begun is finished. A
+  // command below 0.3, as of a tap on the stick's middle, is none.
+  rise() {
+    const { jump, rises } = this;
+    if (jump.left <= 0) {
+      jump.rise = Math.hypot(...this.wanted) > 0.3 ? rises[1] : this.jumps ? rises[0] : 0;
+      jump.left = jump.rise ? jump.left + JUMP_STANCE + 2 * Math.sqrt((2 * jump.rise) / GRAVITY) : 0;
+      this.jumps = false;
+    }
+    if (jump.rise) jump.left -= PERIOD;
+    return jump.rise;
+  }
+
+  // The command of the next policy step [m/s, m/s, rad/s, m]: gentle changes, and the heading held where nobody turns.
   next(yaw) {
+    const rise = this.rises ? this.rise() : 0;
+    if (this.rises && !rise) {
+      this.command = [0, 0, 0];
+      return [0, 0, 0, 0];
+    }
     const [ahead, back, aside, turning] = this.most, limits = [this.wanted[0] > 0 ? ahead : back, aside, turning], rate = [1.1, 0.9, 3.0];
     this.command = this.command.map((now, i) => now + clamp(this.wanted[i] * limits[i] - now, -rate[i] * PERIOD, rate[i] * PERIOD));
     if (this.heading === null || this.command[2] !== 0) this.heading = yaw;
-    const moves = this.command.some((x) => Math.abs(x) > 0.1);
+    const moves = rise || this.command.some((x) => Math.abs(x) > 0.1);
     const turn = this.command[2] || (moves ? clamp(1.2 * wrap(this.heading - yaw), -0.5, 0.5) : 0);
-    return [this.command[0], this.command[1], turn];
+    return [this.command[0], this.command[1], turn, rise];
   }
 }
 
@@ -271,6 +297,7 @@ class Panel {
     this.robots.forEach((button, i) => button.setAttribute('aria-pressed', i === app.robot));
     this.loads = Array.from({ length: feet }, () => document.createElement('output'));
     $('loads').replaceChildren(...this.loads);
+    $('jumps').hidden = !ROBOTS[app.robot].rises;
     $('middle').textContent = end / 2e3;
     $('end').textContent = end / 1e3;
   }
@@ -425,11 +452,11 @@ class App {
   }
 
   enter(robot) {
-    const { core } = this, { file, most, away } = ROBOTS[robot];
+    const { core } = this, { file, most, rises, away } = ROBOTS[robot];
     this.robot = robot;
     core.open(file);
     this.picture.setRobot(core.parts, core.view().cell);
-    this.driver.most = most;
+    Object.assign(this.driver, { most, rises });
     this.camera.distance = away;
     this.panel.entered();
     this.choose(this.ground, this.shape);
@@ -462,15 +489,19 @@ class App {
   }
 
   restart() {
-    Object.assign(this.driver, { command: [0, 0, 0], heading: null, again: false });
+    Object.assign(this.driver, { command: [0, 0, 0], heading: null, again: false, jumps: false, jump: { rise: 0, left: 0 } });
     this.camera.target = null;
     this.before = this.core.view().link.slice();
     $('toast').classList.remove('on');
   }
 
-  // Nobody drives: it walks on its own, and wanders a little.
+  // Nobody drives: it walks on its own, and wanders a little, or jumps every four seconds.
   wander() {
-    const t = this.time;
+    const t = this.time, { rises } = this.driver;
+    if (rises) {
+      this.driver.jumps = t % 4 < 1;
+      return [0, 0, 0];
+    }
     return t < 0.8 ? [0, 0, 0] : [0.45, 0, 0.16 * Math.sin(0.21 * t)];
   }
 
@@ -555,7 +586,7 @@ function runTest(app) {
       speed: Math.hypot(link[3] - x[0], link[7] - x[1]) / (PERIOD * (app.steps - x[2])), scale: app.picture.scale,
     };
     const before = performance.now();
-    for (let i = 0; i < 100; i++) app.core.c.web_step(speed, 0, 0);
+    for (let i = 0; i < 100; i++) app.core.c.web_step(speed, 0, 0, 0);
     window.report = {
       ...report, step_ms: (performance.now() - before) / 100,
       bytes: performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))

@@ -247,9 +247,11 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
         policy_def(policy)->scan != shape.scan) {
         return stop("the policy is another robot's");
     }
+    if (shape.scan > 0) {
+        return stop("the policy sees the ground (task.scan), which the page does not show it");
+    }
     robot_set_shells(robot, task->shells_stand);
-    MildStatus status = task_def_check_plain(task, "page", error);
-    status = status == MILD_OK ? pack_model(robot, task, &file, error) : status;
+    MildStatus status = pack_model(robot, task, &file, error);
     if (status == MILD_OK) {
         status = pack_belief(robot, &file, error);
     }

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import urllib.request
 
-FILES = ["draw.js", "g1.bin", "g1_run.bin", "go1.bin", "index.html", "mild.js", "mild.wasm", "sa01.bin", "style.css"]
+FILES = ["draw.js", "g1.bin", "g1_jump.bin", "g1_run.bin", "go1.bin", "index.html", "mild.js", "mild.wasm", "sa01.bin", "style.css"]
 
 mild, folder = sys.argv[1], pathlib.Path(sys.argv[2])
 if not folder.exists():

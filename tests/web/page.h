@@ -15,8 +15,8 @@
 
 enum { SECOND = 100 /* policy steps */ };
 
-/* The robots of the page. All have as many joints and see as much. */
-enum { ON_SA01, ON_G1, ON_GO1, ROBOTS, ON_G1_RUN = ROBOTS, PAGES };
+/* The robots of the page. All have as many joints, and see as much but for the rise of a jump. */
+enum { ON_SA01, ON_G1, ON_GO1, ROBOTS, ON_G1_RUN = ROBOTS, ON_G1_JUMP, PAGES };
 
 typedef struct {
     const char *name, *robot_name, *policy, *config;
@@ -31,7 +31,8 @@ static Page pages[PAGES] = {
     {.name = "sa01", .robot_name = "sa01", .policy = "mild", .config = "walk"},
     {.name = "g1", .robot_name = "g1", .policy = "g1", .config = "g1"},
     {.name = "go1", .robot_name = "go1", .policy = "go1", .config = "go1"},
-    {.name = "g1_run", .robot_name = "g1", .policy = "g1_run", .config = "g1_run"}};
+    {.name = "g1_run", .robot_name = "g1", .policy = "g1_run", .config = "g1_run"},
+    {.name = "g1_jump", .robot_name = "g1", .policy = "g1_jump", .config = "g1_jump"}};
 static Pool *pool;
 /* Of the robot that the tests are on: SA01, where they do not choose another. */
 static WebModel *model;
@@ -67,7 +68,8 @@ static inline void open_page(Page *page) {
     snprintf(config, sizeof config, MILD_SOURCE_DIR "/configs/%s.ini", page->config);
     assert_int_equal(experiment_task(&page->task, 0, unused, config, path, &error), MILD_OK);
     robot_set_shells(page->robot, page->task.shells_stand);
-    assert_int_equal(page->model->shape.history, SA01_HISTORY);
+    const int jumps = page->task.jump[1] > 0;
+    assert_int_equal(page->model->shape.history, SA01_HISTORY + TASK_FRAMES * jumps);
     assert_int_equal(page->model->shape.actions, SA01_JOINTS);
 }
 

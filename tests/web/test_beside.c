@@ -18,7 +18,7 @@ static void policy_of(int which) {
             worst = fmaxf(worst, fabsf(mine[i] - theirs[i]));
             largest = fmaxf(largest, fabsf(theirs[i]));
         }
-        assert_false(web_step(0.6f, 0, 0));
+        assert_false(web_step(0.6f, 0, 0, 0));
     }
     printf("  %s: actions up to %.2f, apart by at most %.5f (bound 0.01)\n", pages[which].name,
            (double)largest, (double)worst);
@@ -94,7 +94,7 @@ TEST(test_policy_with_the_phase) {
             worst = fmaxf(worst, fabsf(mine[i] - theirs[i]));
             matters = fmaxf(matters, fabsf(usual[i] - theirs[i]));
         }
-        web_step(0.6f, 0, 0);
+        web_step(0.6f, 0, 0, 0);
     }
     printf(
         "  with heights and clock: actions apart by at most %.1e (bound 1e-4), by %.2f without\n",
@@ -108,7 +108,7 @@ TEST(test_policy_with_the_phase) {
  * what differs grows with the gait. Under the Go1's round feet the batch's Newton steps end early
  * at some step, as mild/batch.h says; test_same_loads is about it. */
 static void same_steps_of(int which) {
-    static const float walk[3] = {0.6f, 0, 0};
+    static const float walk[TASK_COMMANDS] = {0.6f};
     const int grounds[] = {preset("sand_loose"), preset("foam45"), preset("grass"), WEB_RIGID};
     choose(which);
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
@@ -141,7 +141,7 @@ TEST(test_same_steps) {
 /* The same beside MuJoCo's robot on mild_ground_solve: what feet and shells carry. The Go1's knees
  * stand in loose sand. */
 static void same_loads_of(int which) {
-    static const float walk[3] = {0.6f, 0, 0};
+    static const float walk[TASK_COMMANDS] = {0.6f};
     const int grounds[] = {preset("sand_loose"), preset("foam45"), preset("grass"), WEB_RIGID};
     choose(which);
     const double weight = 9.81 * robot_total_mass(robot);
@@ -200,7 +200,7 @@ typedef struct {
 
 /* The page on its own soil, an engine on a material. batch: as of rival_start_material. */
 static Beside beside_soil(int batch, const MildMaterial *material) {
-    static const float walk[3] = {0.6f, 0, 0};
+    static const float walk[TASK_COMMANDS] = {0.6f};
     const double weight = 9.81 * robot_total_mass(robot);
     Rival rival = {0};
     EnvsSample sample[16];
@@ -272,7 +272,7 @@ typedef struct {
 } Fallen;
 
 static void fall(const Fall *def, Fallen *mine, Fallen *theirs) {
-    static const float still[3] = {0, 0, 0};
+    static const float still[TASK_COMMANDS] = {0};
     float action[SA01_JOINTS] = {0};
     Rival rival = {0};
     EnvsSample sample[16];

@@ -56,7 +56,7 @@ static double walk(double seconds, float speed) {
     const int steps = (int)(seconds * SECOND), begin = settling(steps);
     double x = 0, y = 0;
     for (int t = 0; t < steps; t++) {
-        if (web_step(speed, 0, 0)) {
+        if (web_step(speed, 0, 0, 0)) {
             fail_msg("fell after %g s", 0.01 * t);
         }
         x = t == begin - 1 ? (double)view->link[0][3] : x;
@@ -173,7 +173,7 @@ static void lowest_corner(int s, double lowest[3]) {
 /* Shanks in the ground press what is drawn of it, as deep as they are: an imprint that stays in
  * sand and springs back in foam. A corner of their boxes on end is narrower than a cell. */
 TEST(test_imprints_of_shells) {
-    static const float still[3] = {0, 0, 0};
+    static const float still[TASK_COMMANDS] = {0};
     static const float kneel[6] = {0, 0, -0.5f, 4, -2, 0};
     for (int sand = 0; sand < 2; sand++) {
         float action[SA01_JOINTS];
@@ -229,7 +229,7 @@ static void walk_past(double x, float speed) {
     const WebView *view = web_view();
     for (int t = 0; speed * ((double)view->link[0][3] - x) < 0; t++) {
         assert_true(t < 30 * SECOND);
-        assert_false(web_step(speed, 0, (float)-facing()));
+        assert_false(web_step(speed, 0, (float)-facing(), 0));
     }
 }
 
@@ -257,7 +257,7 @@ static double standing_depth(double stiffness) {
     double sum = 0;
     web_change(stiffness, 1);
     for (int t = 0; t < steps; t++) {
-        assert_false(web_step(0, 0, 0));
+        assert_false(web_step(0, 0, 0, 0));
         sum += t < begin ? 0 : (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
     }
     return sum / (steps - begin);
@@ -283,7 +283,7 @@ static void soles_of(int which) {
     const double weight = 9.81 * robot_total_mass(robot);
     start(preset("sand_loose"), WEB_LEVEL, 1);
     for (int t = 0; t < 3 * SECOND; t++) {
-        assert_false(web_step(0.6f, 0, 0));
+        assert_false(web_step(0.6f, 0, 0, 0));
         shells += (double)view->shell_load / (3 * SECOND);
         for (int f = 0; f < view->feet; f++) {
             double sum = 0, center[2] = {0, 0};
@@ -319,7 +319,7 @@ TEST(test_run) {
     walk(3, 3);
     const double from = (double)view->link[0][3], left = (double)view->link[0][7];
     for (int t = 0; t < 3 * SECOND; t++) {
-        assert_false(web_step(3, 0, 0));
+        assert_false(web_step(3, 0, 0, 0));
         flies += view->load[0] == 0 && view->load[1] == 0;
     }
     const double speed =
@@ -328,6 +328,30 @@ TEST(test_run) {
            flies * 100 / (3 * SECOND));
     choose(ON_SA01);
     assert_true(speed > 2.7 && flies > 3 * SECOND / 10);
+}
+
+/* The G1 that jumps: the highest that its base gets [m] while no foot carries, in so many steps. */
+static double flight(int steps, float rise) {
+    const WebView *view = web_view();
+    float top = 0;
+    for (int t = 0; t < steps; t++) {
+        assert_false(web_step(0, 0, 0, rise));
+        const int flies = view->load[0] == 0 && view->load[1] == 0;
+        top = flies ? fmaxf(top, view->link[0][11]) : top;
+    }
+    return (double)top;
+}
+
+/* It stands without a rise; with one it jumps twice, each time for 0.6 s and a flight of 0.57 s. */
+TEST(test_jump) {
+    choose(ON_G1_JUMP);
+    start(preset("grass"), WEB_LEVEL, 1);
+    assert_true(flight(2 * SECOND, 0) == 0);
+    const double stands = (double)web_view()->link[0][11], top = flight(234, 0.4f);
+    printf("  it stands at %.2f m and jumps to %.2f m\n", stands, top);
+    flight(SECOND, 0);
+    assert_true(top - stands > 0.2 && flight(SECOND, 0) == 0 && web_view()->link[0][10] > 0.95f);
+    choose(ON_SA01);
 }
 
 TEST(test_soles) {
@@ -339,7 +363,7 @@ TEST(test_soles) {
 static void walk_to(double x) {
     for (int t = 0; (double)web_view()->link[0][3] < x; t++) {
         assert_true(t < 20 * SECOND);
-        assert_false(web_step(1, 0, 0));
+        assert_false(web_step(1, 0, 0, 0));
     }
 }
 
@@ -392,7 +416,7 @@ TEST(test_sliders) {
         assert_true(kit_short() || fabs(depth[i] - rival) < 0.1 * rival);
     }
     for (int t = 0; t < 4 * SECOND; t++) {
-        web_step(0, 0, 0);
+        web_step(0, 0, 0, 0);
         load += carried() / (4 * SECOND);
     }
     printf("  the soles carry %.1f N of %.1f N\n", load, 9.81 * robot_total_mass(robot));
@@ -401,7 +425,7 @@ TEST(test_sliders) {
         start(rigid ? WEB_RIGID : preset("rubber"), WEB_LEVEL, 1);
         web_change(1, 0.05);
         float fastest = 0;
-        for (int t = 0; t < 3 * SECOND && !web_step(0.8f, 0, 0); t++) {
+        for (int t = 0; t < 3 * SECOND && !web_step(0.8f, 0, 0, 0); t++) {
             fastest = fmaxf(fastest, web_view()->velocity[0]);
         }
         printf("  on ice it gets to %.2f of 0.8 m/s\n", (double)fastest);
@@ -415,7 +439,7 @@ static void turn_away(void) {
     const WebView *view = web_view();
     double from[3] = {0, 0, 0}, shown[3] = {0, 0, 0};
     for (int t = 0; t < 4 * SECOND; t++) {
-        assert_false(web_step(0.37f, 0.11f, 0.5f));
+        assert_false(web_step(0.37f, 0.11f, 0.5f, 0));
         for (int k = 0; k < 3 && t >= 3 * SECOND; k++) {
             shown[k] += (double)view->velocity[k] / SECOND;
         }
@@ -473,7 +497,7 @@ static void walk_two_seconds(const char *soil, int ground, float found[3]) {
     assert_null(web_start(ground, WEB_LEVEL, 1));
     found[2] = 0;
     for (int t = 0; t < 2 * SECOND; t++) {
-        assert_false(web_step(0.5f, 0, 0));
+        assert_false(web_step(0.5f, 0, 0, 0));
         found[2] = fmaxf(found[2], fmaxf(web_view()->depth[0], web_view()->depth[1]));
     }
     found[0] = web_view()->link[0][3];

@@ -81,12 +81,33 @@ pads = [];
 
 // The command: its largest numbers and their rates [m/s, m/s, rad/s], and a heading that is held.
 const steps = (count, wanted, yaw) => { driver.wanted = wanted; let last; for (let i = 0; i < count; i++) last = driver.next(yaw); return last; };
-near(steps(1, [1, 1, 1], 0), [0.011, 0.009, 0.03], 'a first step');
-near(steps(400, [1, 1, 1], 0), [1.15, 0.35, 1], 'in the end');
-near(steps(400, [-1, -1, -1], 0), [-0.9, -0.35, -1], 'and backwards');
-near(steps(400, [1, 0, 0], 0.3), [1.15, 0, 0], 'straight');
-near(driver.next(0.4), [1.15, 0, -0.12], 'too far to the left: back to the right');
-near(driver.next(0.3 + 2 * Math.PI - 0.1), [1.15, 0, 0.12], 'and the other way round');
+near(steps(1, [1, 1, 1], 0), [0.011, 0.009, 0.03, 0], 'a first step');
+near(steps(400, [1, 1, 1], 0), [1.15, 0.35, 1, 0], 'in the end');
+near(steps(400, [-1, -1, -1], 0), [-0.9, -0.35, -1, 0], 'and backwards');
+near(steps(400, [1, 0, 0], 0.3), [1.15, 0, 0, 0], 'straight');
+near(driver.next(0.4), [1.15, 0, -0.12, 0], 'too far to the left: back to the right');
+near(driver.next(0.3 + 2 * Math.PI - 0.1), [1.15, 0, 0.12, 0], 'and the other way round');
+
+// Every command of a robot that jumps is a jump, of a stance and a free flight: Space and the stick's middle in place; what is let go ends.
+const jumper = ROBOTS.find(({ rises }) => rises), [high, low] = jumper.rises, flight = (rise) => 2 * Math.sqrt((2 * rise) / 9.81);
+const stance = Number(fs.readFileSync(`${root}/configs/g1_jump.ini`, 'utf8').match(/^jump_stance = (\S+)/m)[1]);
+const untilItStands = () => { let count = 0; while (driver.next(0)[3] && count < 1e4) count++; return count; };
+key('keydown', 'Space');
+assert.equal(driver.next(0)[3], 0, 'nobody else jumps');
+key('keyup', 'Space');
+Object.assign(driver, { most: jumper.most, rises: jumper.rises, command: [0, 0, 0], heading: null, touched: false });
+near(steps(1, [0, 0, 0], 0), [0, 0, 0, 0], 'it stands');
+for (const ask of [() => key('keydown', 'Space'), () => touch('pointerdown', 0, 0)]) {
+  ask();
+  near(driver.next(0), [0, 0, 0, high], 'in place');
+  assert.equal(untilItStands(), Math.ceil((stance + flight(high)) / 0.01) - 1);
+  assert.ok(driver.touched);
+}
+near(steps(Math.ceil((3 * (stance + flight(low))) / 0.01), [1, 0, 0], 0), [jumper.most[0], 0, 0, low], 'three forward');
+driver.wanted = [0, 0, 0];
+assert.equal(untilItStands(), 0, 'are three whole ones');
+near(driver.next(0), [0, 0, 0, 0], 'and then it stands');
+Object.assign(driver, { most: ROBOTS[0].most, rises: undefined, heading: null });
 
 // ---- what is read from the core ----
 
@@ -166,10 +187,10 @@ panel.drawSpeed(view, [-0.65, 0.1, 0.2], 1, 1e3);
 assert.equal($('numbers').innerHTML, '<b>0.50</b> m/s · -0.65 asked');
 near([parseFloat($('asked').style.left), parseFloat($('measured').style.left), parseFloat($('measured').style.width)], [25, 50, 50 * 0.5 / 1.3], 'speeds on their scale');
 
-// A step hands the command over as web_step takes it: forward, left, turn.
+// A step hands the command over as web_step takes it: forward, left, turn, rise.
 Object.assign(driver, { command: [0, 0, 0], heading: null, wanted: [1, -1, 1] });
 app.step();
-near(stepped[0], [0.011, -0.009, 0.03], 'web_step');
+near(stepped[0], [0.011, -0.009, 0.03, 0], 'web_step');
 app.core.start = (...all) => started.push(all);
 Object.assign(app, { picture: { setHills() {} }, camera: {} });
 Object.assign(core, { hills: () => 0 });
@@ -230,10 +251,11 @@ await lost;
 assert.deepEqual([app.robot, said.at(-1)], [1, 'G1: g1.bin: 404']);
 
 // What a robot is asked lies within what its policy was trained for.
-for (const { file, most } of ROBOTS) {
+for (const { file, most, rises = [] } of ROBOTS) {
   const config = fs.readFileSync(`${root}/configs/${file === 'sa01' ? 'walk' : file}.ini`, 'utf8');
   const range = (name) => (config.match(new RegExp(`^${name} = (\\S+) (\\S+)`, 'm')) ?? [0, 0, 0]).slice(1).map(Number);
-  const [vx, back, vy, wz] = ['vx', 'backward_vx', 'vy', 'wz'].map(range);
+  const [vx, back, vy, wz, jump] = ['vx', 'backward_vx', 'vy', 'wz', 'jump'].map(range);
   assert.ok(most[0] <= vx[1] && most[1] <= -Math.min(vx[0], back[0]) && most[2] <= vy[1] && most[3] <= wz[1], `${file}: ${most}`);
+  assert.ok(rises.every((rise) => rise >= jump[0] && rise <= jump[1]), `${file}: ${rises}`);
 }
 console.log(`page: robots, keys, stick, gamepad; ${fields.size} fields of WebView; soles and speeds`);
