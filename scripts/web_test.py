@@ -147,12 +147,12 @@ def drive(browser):
     press(browser, "keyUp", "Digit1", "1")
     if not browser.wait("app.ground === 0 && app.core.view().link[3] < 0.5", 5):
         wrong.append("the key 1 does not choose rubber")
-    browser.value("document.querySelectorAll('#grounds button')[7].click()")
-    if not browser.wait("app.ground === 6", 5):
-        wrong.append("a click does not choose loose sand")
     browser.value("$ = document.getElementById('stiffness'); $.value = 1; $.dispatchEvent(new Event('input'))")
     if not browser.wait("app.time > 0 && document.getElementById('stiffness-value').textContent === '\u00d7 4.00'", 5):
         wrong.append("the slider of the stiffness does not say what it is")
+    browser.value("document.querySelectorAll('#grounds button')[7].click()")
+    if not browser.wait("app.ground === 6", 5):
+        wrong.append("a click does not choose loose sand")
     browser.value("app.time0 = app.time; app.driver.touched = true")
     stiff = browser.wait("app.time > app.time0 + 2 && Math.max(...app.core.view().depth)", 20)
     if not stiff or stiff > 0.03:
