@@ -76,7 +76,7 @@ static int open_usual(void **state) {
     return 0;
 }
 
-/* kp (q0 + scale a + offset - q) - kd qd with the gains of docs/task.md section 4, by joint. */
+/* kp (q0 + scale a + offset - q) - kd qd with the gains of docs/policy.md section 5, by joint. */
 static double wanted_torque(int i, const double *pose, double action, int k) {
     const double kp[LEG_JOINTS] = {50, 50, 70, 70, 20, 20}, kd[LEG_JOINTS] = {5, 5, 7, 7, 0.2, 0.2};
     const double limit[LEG_JOINTS] = {119, 119, 119, 119, 20.4, 20.4};
