@@ -174,17 +174,20 @@ def attempt(failed, *arguments):
 
 
 def merge(path, header, rows):
-    """Writes a CSV whose rows are named by their first two cells: these, and those of the file that are not among them."""
-    before = []
+    """Writes a CSV whose rows are named by their first two cells: these, and those of the file that are not among them. Columns that the
+    file has beyond the header's stay as they are."""
+    first, before, width = header, [], len(header)
     if path.is_file():
         with open(path, encoding="utf-8", newline="") as file:
             first, *before = [row for row in csv.reader(file) if row] or [header]
-        if first != header:
+        if first[:width] != header:
             sys.exit(f"public_policies: {path} has other columns; name another file or remove it")
-    whole = {tuple(row[:2]): row for row in [*before, *rows]}
+    whole = {tuple(row[:2]): row for row in before}
+    for row in rows:
+        whole[tuple(row[:2])] = row + whole.get(tuple(row[:2]), [""] * len(first))[width:]
     part = path.with_name(path.name + ".part")
     with open(part, "w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *whole.values()])
+        csv.writer(file, lineterminator="\n").writerows([first, *whole.values()])
     part.replace(path)
 
 

@@ -294,10 +294,12 @@ class Script(unittest.TestCase):
             self.assertEqual([row.split(",")[:3] for row in table.read_text().splitlines()[1:]],
                              [["mild_go1", "rigid", "10"], ["unitree_g1", "rigid", "1"], ["unitree_h1", "rigid", "8"], ["h1_2_sim2sim", "rigid", "1"]])
             table = out / "s50.csv"
-            table.write_text("policy,sweep,unit,verdict,S50,low,high,trials,upright\nunitree_g1,stiffness,MPa/m,inside,2.6,2.3,2.8,44,21\n")
-            status, text = self.run_main(out, "--out", out, "--only", "unitree_h1,unitree_g1", "--sweep", "slip", "--csv", table)
+            table.write_text("policy,sweep,unit,verdict,S50,low,high,trials,upright,own\nunitree_g1,stiffness,MPa/m,inside,2.6,2.3,2.8,44,21,a\n"
+                             "unitree_g1,slip,mm,inside,2,1.9,2.1,44,21,b\n")
+            status, text = self.run_main(out, "--out", out, "--only", "unitree_h1,unitree_g1,mild_go1", "--sweep", "slip", "--csv", table)
             self.assertEqual((status, "| unitree_h1 | failed |" in text, "3 (2.9 to 3.1)" in text), (1, True, True))
-            self.assertEqual([row.split(",")[:2] for row in table.read_text().splitlines()[1:]], [["unitree_g1", "stiffness"], ["unitree_g1", "slip"]])
+            self.assertEqual([[row.split(",")[k] for k in (0, 1, 4, 9)] for row in table.read_text().splitlines()[1:]],
+                             [["unitree_g1", "stiffness", "2.6", "a"], ["unitree_g1", "slip", "3", "b"], ["mild_go1", "slip", "3", ""]])
             status, _ = self.run_main(out, "--only", "nobody")
             self.assertRegex(status, "^public_policies: --only: no policy is named nobody; there are")
 
