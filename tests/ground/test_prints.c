@@ -99,6 +99,31 @@ TEST(test_straight_down) {
     mild_sole_destroy(sole);
 }
 
+/* A tilted plate that goes forward and down passes through its own print, which takes nothing from
+ * the ground under it and strikes none of it twice: it bears what it bears where no print stays. */
+TEST(test_own_trail) {
+    enum { WAY = 80 };
+    MildSole *sole = kit_plate(8, 4);
+    MildMaterial m = kit_preset("sand_loose");
+    m.model = MILD_MODEL_MILD_MERGED;
+    const double c = cos(0.15), s = sin(0.15), tilted[9] = {c, 0, s, 0, 1, 0, -s, 0, c};
+    double mean[2] = {0.0};
+    for (int print = 0; print < 2; print++) {
+        Kit kit;
+        prints_open(&kit, 1, sole, NULL, &m, 1e-3, print ? TILES : 0);
+        memcpy(kit.input.rotation[0], tilted, sizeof tilted);
+        kit.input.velocity[0][0] = kit.input.free_velocity[0] = 1.0;
+        for (int k = 0; k < WAY; k++) {
+            kit.input.position[0][0] = 1e-3 * k;
+            mean[print] += move_to(&kit, 1e-3 * k - 0.01) / WAY;
+        }
+        kit_close(&kit);
+    }
+    assert_true(mean[0] > 100.0);
+    expect_near("mean force with its print, by that without", mean[1] / mean[0], 1.0, 0.02);
+    mild_sole_destroy(sole);
+}
+
 /* Dragged at 5 mm into its imprint of 20 mm, a foot is carried by what is not over the imprint yet,
  * along x as along y, forward and backward, step by step. */
 TEST(test_into_a_print) {

@@ -28,10 +28,12 @@ MILD_HD int slot_stays(const Slots *s, int i, Real m1, int prints) {
 }
 
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
- * and in every cell that it slides out of. When it slides into a deeper imprint it takes over that
- * depth. A greater depth never means more force, and an element takes a lesser one while it carries
- * nothing, so this adds no energy. v: its velocity in the frame of the foot. refill: [-] of the
- * material. */
+ * and in every cell that it slides out of. Where it slides into an imprint that is deeper than all
+ * of its sole it takes over that depth. A greater depth never means more force, and an element
+ * takes a lesser one while it carries nothing, so this adds no energy. A lesser imprint may be that
+ * of a neighbour: an element that had to reach it first would strike all of the added mass again,
+ * from rest, in every cell. v: its velocity in the frame of the foot. refill: [-] of the material.
+ */
 static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                             const SlotVelocity *v, int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
@@ -53,16 +55,16 @@ static void element_imprint(const Advance *a, const Memory *memory, const Slots 
         return;
     }
     imprints_press(a->imprints, &left, lifted ? s->virgin_depth[i] : memory->depth_max[e]);
-    if (lifted) {
-        return;
-    }
     const ImprintElement entered = {x1, y1, a->foot->pitch, a->rotation};
-    const double found = imprints_read(a->imprints, &entered);
-    if (found <= memory->depth_max[e]) {
-        return;
+    const double found = lifted ? 0.0 : imprints_read(a->imprints, &entered);
+    double deepest = 0.0; /* of the sole */
+    for (int other = 0; other < a->foot->elements && deepest < found; other++) {
+        deepest = real_max(memory->middle[other], deepest);
     }
-    memory->depth_max[e] = found;
-    memory->front_speed[e] = 0.0;
+    if (found > real_max(deepest + ELEMENT_ELASTIC, memory->depth_max[e])) {
+        memory->depth_max[e] = found;
+        memory->front_speed[e] = 0.0;
+    }
 }
 
 /* [m/s] frame_sinks of a slot. v: its velocity in the frame of the foot. */
