@@ -76,15 +76,15 @@ TEST(test_no_allocation) {
 }
 
 /* Soles, shells, whose lists grow, and scratches, with the n-th allocation failing until none does:
- * nothing comes back, and nothing leaks. */
+ * nothing comes back, nothing leaks, and a shell's sampling ends there. */
 TEST(test_failing_allocations) {
     if (!COUNTING) {
         skip();
     }
     double vertices[18];
     const double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
-    const MildShape shapes[2] = {surface_wedge(0.1, 0.1, 0.1, vertices),
-                                 surface_box(0.2, 0.05, 0.05)};
+    const MildShape shapes[2] = {surface_box(0.2, 0.05, 0.05),
+                                 surface_wedge(0.1, 0.1, 0.1, vertices)};
     const MildSoleDef plane = {box, 4, KIT_PITCH, KIT_SOLE_Z, 0};
     const MildSurfaceDef shell = {.shapes = shapes, .count = 2, .pitch = 0.01};
     static const int least[3] = {2, 6, 2}; /* refusals */
@@ -94,6 +94,7 @@ TEST(test_failing_allocations) {
         int refused = 0;
         for (const void *made = NULL; !made; refused += !made) {
             MildError error = {0};
+            const int before = allocations;
             fail_at = refused + 1;
             if (what < 2) {
                 made = soles[what] =
@@ -103,6 +104,7 @@ TEST(test_failing_allocations) {
             }
             fail_at = 0;
             assert_int_equal(error.status, made ? MILD_OK : MILD_ERROR_MEMORY);
+            assert_true(made || what != 1 || allocations == before + refused + 1);
         }
         assert_true(refused >= least[what]);
     }

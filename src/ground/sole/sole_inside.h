@@ -16,13 +16,13 @@ typedef struct {
 typedef struct {
     Sample *list;
     int count;
-    int room;   /* of the list */
-    int most;   /* of count */
-    int failed; /* bool: out of memory */
-    int full;   /* bool: more than `most` */
+    int room;          /* of the list */
+    int most;          /* of count */
+    MildStatus status; /* MILD_ERROR_RANGE: more than `most`; MILD_ERROR_MEMORY: no room. The first
+                          of these ends the sampling */
 } Samples;
 
-/* Counts what does not fit in `full` and `failed`. */
+/* Adds nothing once status is not MILD_OK. */
 void samples_add(Samples *samples, const Sample *sample);
 
 /* ---- sole_mesh.c: meshes as parts of a shell ---- */

@@ -18,15 +18,17 @@ typedef struct {
 } Triangle;
 
 void samples_add(Samples *samples, const Sample *sample) {
-    if (samples->count == samples->most || samples->failed) {
-        samples->full |= samples->count == samples->most;
+    if (samples->status == MILD_OK && samples->count == samples->most) {
+        samples->status = MILD_ERROR_RANGE;
+    }
+    if (samples->status != MILD_OK) {
         return;
     }
     if (samples->count == samples->room) {
         const int room = samples->room ? 2 * samples->room : 256;
         Sample *list = realloc(samples->list, (size_t)room * sizeof *list);
         if (!list) {
-            samples->failed = 1;
+            samples->status = MILD_ERROR_MEMORY;
             return;
         }
         samples->list = list;
@@ -165,7 +167,7 @@ static void triangle_cut(const Triangle *triangle, const Cells *cells, double pi
     }
     const int n = (int)ceil(fmax(longest / (MESH_CUT * pitch), 1.0));
     const double area = triangle->area / n / n;
-    for (int i = 0; i < n && !pieces->full; i++) {
+    for (int i = 0; i < n && pieces->status == MILD_OK; i++) {
         for (int j = 0; i + j < n; j++) {
             triangle_piece(triangle, cells, area, (i + 1.0 / 3) / n, (j + 1.0 / 3) / n, pieces);
             if (i + j < n - 1) {
@@ -210,17 +212,16 @@ static void pieces_join(const Sample *piece, int count, Samples *samples) {
 void mesh_sample(const MildShape *mesh, double pitch, Samples *samples) {
     const Cells cells = cells_of(mesh, pitch);
     Samples pieces = {.most = MESH_PIECES_MAX};
-    for (int t = 0; t < mesh->triangle_count && !pieces.full; t++) {
+    for (int t = 0; t < mesh->triangle_count && pieces.status == MILD_OK; t++) {
         const Triangle triangle = triangle_of(mesh, t);
         if (triangle.area > MESH_LEAST) {
             triangle_cut(&triangle, &cells, pitch, &pieces);
         }
     }
-    samples->failed |= pieces.failed;
-    samples->full |= pieces.full;
-    if (pieces.count > 0 && !pieces.failed && !pieces.full) {
+    samples->status = pieces.status;
+    if (pieces.count > 0 && pieces.status == MILD_OK) {
         qsort(pieces.list, (size_t)pieces.count, sizeof *pieces.list, piece_compare);
-        for (int i = 0, end; i < pieces.count; i = end) {
+        for (int i = 0, end; i < pieces.count && samples->status == MILD_OK; i = end) {
             for (end = i + 1; end < pieces.count && pieces.list[end].key == pieces.list[i].key;) {
                 end++;
             }

@@ -19,7 +19,7 @@ static int divide(double length, double pitch, int least) {
 }
 
 static void box_sample(const MildShape *box, double pitch, Samples *samples) {
-    for (int face = 0; face < 6 && !samples->full; face++) {
+    for (int face = 0; face < 6 && samples->status == MILD_OK; face++) {
         const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
         const double side = face % 2 ? 1.0 : -1.0;
         const double a = 2.0 * box->size[u], b = 2.0 * box->size[v];
@@ -27,7 +27,7 @@ static void box_sample(const MildShape *box, double pitch, Samples *samples) {
         Sample sample = {.area = a / columns * (b / rows)};
         sample.at[axis] = side * box->size[axis];
         sample.normal[axis] = side;
-        for (int i = 0; i < columns && !samples->full; i++) {
+        for (int i = 0; i < columns && samples->status == MILD_OK; i++) {
             for (int j = 0; j < rows; j++) {
                 sample.at[u] = a * ((i + 0.5) / columns - 0.5);
                 sample.at[v] = b * ((j + 0.5) / rows - 0.5);
@@ -42,7 +42,7 @@ static void ring_sample(double radius, double z, double sine, double cosine, dou
                         double pitch, Samples *samples) {
     const double around = radius * sine;
     const int count = divide(2.0 * LAW_PI * around, pitch, SHAPE_ROUND);
-    for (int i = 0; i < count && !samples->full; i++) {
+    for (int i = 0; i < count && samples->status == MILD_OK; i++) {
         const double angle = 2.0 * LAW_PI * (i + 0.5) / count;
         const double c = cos(angle), s = sin(angle);
         const Sample sample = {.at = {around * c, around * s, z + radius * cosine},
@@ -55,12 +55,12 @@ static void ring_sample(double radius, double z, double sine, double cosine, dou
 /* A sphere is a capsule without a cylinder. */
 static void round_sample(double radius, double half, double pitch, Samples *samples) {
     const int rings = half > 0.0 ? divide(2.0 * half, pitch, 1) : 0;
-    for (int i = 0; i < rings; i++) {
+    for (int i = 0; i < rings && samples->status == MILD_OK; i++) {
         const double z = 2.0 * half * ((i + 0.5) / rings - 0.5);
         ring_sample(radius, z, 1.0, 0.0, 4.0 * LAW_PI * radius * half / rings, pitch, samples);
     }
     const int bands = divide(0.5 * LAW_PI * radius, pitch, SHAPE_ROUND / 4);
-    for (int i = 0; i < 2 * bands; i++) {
+    for (int i = 0; i < 2 * bands && samples->status == MILD_OK; i++) {
         const double from = 0.5 * LAW_PI * i / bands, to = 0.5 * LAW_PI * (i + 1) / bands;
         const double area = 2.0 * LAW_PI * radius * radius * (cos(from) - cos(to));
         const double middle = 0.5 * (from + to);
@@ -156,6 +156,9 @@ static void shape_sample(const MildSurfaceDef *def, const int *closed, int index
     case MILD_SHAPE_CAPSULE: round_sample(shape->size[0], shape->size[1], spacing, samples); break;
     case MILD_SHAPE_SPHERE: round_sample(shape->size[0], 0.0, spacing, samples); break;
     default: mesh_sample(shape, spacing, samples); break;
+    }
+    if (samples->status != MILD_OK) {
+        return;
     }
     int kept = first;
     for (int i = first; i < samples->count; i++) {
@@ -298,16 +301,16 @@ MildSole *mild_sole_surface(const MildSurfaceDef *def, MildError *error) {
     for (int i = 0; i < def->count; i++) {
         closed[i] = shape_closed(&def->shapes[i]);
     }
-    for (int i = 0; i < def->count; i++) {
+    for (int i = 0; i < def->count && samples.status == MILD_OK; i++) {
         shape_sample(def, closed, i, &samples);
     }
-    if (samples.full) {
+    if (samples.status == MILD_ERROR_RANGE) {
         mild_fail(error, MILD_ERROR_RANGE,
                   "surface.spacing = %g makes too many elements, at most %d", spacing_of(def),
                   SOLE_ELEMENTS_MAX);
-    } else if (!samples.failed && samples.count == 0) {
+    } else if (samples.status == MILD_OK && samples.count == 0) {
         mild_fail(error, MILD_ERROR_RANGE, "surface.shapes have no outer surface");
-    } else if (samples.failed || !(sole = sole_of(&samples, def->pitch))) {
+    } else if (samples.status != MILD_OK || !(sole = sole_of(&samples, def->pitch))) {
         mild_fail(error, MILD_ERROR_MEMORY, "surface: out of memory for %d elements",
                   samples.count);
     }
