@@ -43,8 +43,9 @@ MEMORY = {"MALLOC_PERTURB_": "165"}
 if pathlib.Path("/lib/x86_64-linux-gnu/libc_malloc_debug.so.0").exists():
     MEMORY |= {"MALLOC_CHECK_": "3", "LD_PRELOAD": "libc_malloc_debug.so.0"}
 
-# A layer without a folder of tests is tested by the layer above it.
-TESTED_BY = {"control": ("control", "eval")}
+# A layer without a folder of tests is tested by the layer above it, wings of the ground by the ground's.
+TESTED_BY = {"control": ("control", "eval")} | {
+    wing: ("ground",) for wing in ("law", "models", "sole", "step", "terrain")}
 
 # ---------------------------------------------------------------------------------------------
 # tests/mutants.txt: equivalent mutants, each with its reason.
@@ -409,8 +410,9 @@ def folder_of(layer):
 
 def choose(options):
     folder = folder_of(options.layer)
-    paths = sorted(p.relative_to(TREE) for p in (TREE / folder).glob("*")
-                   if p.suffix in (".c", ".h") and (not options.file or p.name == options.file))
+    paths = sorted(p.relative_to(TREE) for p in (TREE / folder).rglob("*")
+                   if p.suffix in (".c", ".h") and (not options.file or p.name == options.file) and
+                   (p.parent == TREE / folder or TESTED_BY.get(p.parent.name) == (options.layer,)))
     if not paths:
         sys.exit(f"mutants: no source in {folder}/{options.file or ''}; layers: "
                  f"{' '.join(sorted(p.name for p in (ROOT / 'src').rglob('*') if p.is_dir()))}")
