@@ -52,7 +52,7 @@ typedef struct {
     int robots;                   /* at least 1 */
     int feet;                     /* of each, 1 .. MILD_BATCH_FEET_MAX */
     const MildSole *const *soles; /* [feet] plane soles, then shells; not kept */
-    double dt;                    /* [s] above 0, at most 0.1 */
+    double dt;                    /* [s] 1e-6 .. 0.1 */
     double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */

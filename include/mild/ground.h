@@ -375,7 +375,7 @@ extern const char *const mild_solver_names[MILD_SOLVERS];
 /* What the engine knows before the step. A foot is any body with a sole. */
 typedef struct {
     int feet;                          /* the same as in scratch and ground */
-    double dt;                         /* [s] step size, above 0; tested from 0.25 to 5 ms, and
+    double dt;                         /* [s] step size, from 1e-9; tested from 0.25 to 5 ms, and
                                           a falling foot needs less than 50 ms */
     double position[MILD_FEET_MAX][3]; /* [m] ankle, world */
     /* [-] Foot to world, row major, orthonormal. A sole presses with either side; tilted, its

@@ -331,7 +331,7 @@ TEST(faults) {
         MildStatus status;
         const char *names;
     } cases[] = {
-        {&in->dt, 0, MILD_ERROR_RANGE, "input.dt 0"},
+        {&in->dt, 1e-50, MILD_ERROR_RANGE, "input.dt 1e-50"},
         {&in->dt, NAN, MILD_ERROR_RANGE, "input.dt nan"},
         {&in->dt, INFINITY, MILD_ERROR_RANGE, "input.dt inf"},
         {&in->position[1][2], NAN, MILD_ERROR_ARGUMENT, "input.position 1 2 nan"},

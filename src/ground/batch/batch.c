@@ -13,6 +13,8 @@
 #define BATCH_TOLERANCE 1e-4
 #define BATCH_LIMIT 20
 #define BATCH_MATERIALS_MAX 1000000
+#define BATCH_DT_MIN 1e-6 /* [s] */
+#define BATCH_DT_MAX 0.1
 
 #define BATCH_SIZE(groups, per) {groups, per},
 static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
@@ -57,8 +59,9 @@ static MildStatus check_def(const MildBatchDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: feet = %d is outside 1 .. %d", def->feet,
                          MILD_BATCH_FEET_MAX);
     }
-    if (!(def->dt > 0.0 && def->dt <= 0.1)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "batch: dt = %g s is outside 0 .. 0.1", def->dt);
+    if (!(def->dt >= BATCH_DT_MIN && def->dt <= BATCH_DT_MAX)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: dt = %g s is outside %g .. %g", def->dt,
+                         BATCH_DT_MIN, BATCH_DT_MAX);
     }
     if (!(def->tolerance >= 0.0 && def->tolerance < 1.0)) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: tolerance = %g is outside 0 .. 1",

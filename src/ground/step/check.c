@@ -8,6 +8,7 @@
 #define TURN 1e-6     /* [-] products of a rotation's columns may be off by this */
 #define SYMMETRY 1e-6 /* [-] difference of two mirrored numbers of A, over its scale */
 #define DEFINITE 1e-5 /* [-] an eigenvalue of A may be negative by this, over its scale */
+#define DT_MIN 1e-9   /* [s] */
 
 static MildStatus check_finite(const char *name, int foot, const double *numbers, int count,
                                MildError *error) {
@@ -184,8 +185,9 @@ MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terra
         status = mild_fail(error, MILD_ERROR_ARGUMENT, "input.feet = %d, but the ground has %d",
                            input->feet, ground->feet);
     }
-    if (status == MILD_OK && (!(input->dt > 0) || !isfinite(input->dt))) {
-        status = mild_fail(error, MILD_ERROR_RANGE, "input.dt = %g must be above 0", input->dt);
+    if (status == MILD_OK && (!(input->dt >= DT_MIN) || !isfinite(input->dt))) {
+        status = mild_fail(error, MILD_ERROR_RANGE, "input.dt = %g must be at least %g s",
+                           input->dt, DT_MIN);
     }
     for (int f = 0; f < ground->feet && status == MILD_OK; f++) {
         status = check_foot(input, f, error);
