@@ -67,8 +67,8 @@ sanitize() {
 
 # Of the core in C, without tests that measure for long what others go over too; and what fuzzing found.
 stage_sanitize() {
-    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact|points)'
-    sanitize base ground soil batch learn control task fuzz
+    local without='ground/test_(accuracy|merged|prints|refinement|rim|step|surface_step|thrown)|batch/test_(batch|bodies|contact|points)|env/test_(batch|shells)'
+    sanitize base ground soil batch learn control task env fuzz
 }
 
 stage_sanitize_all() {
