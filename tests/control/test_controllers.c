@@ -65,10 +65,10 @@ TEST(names) {
     MildError error = {0};
     const ControllerDef def = {0};
     Controller controller = {0};
-    assert_int_equal(controller_check("stnad", &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "controller stnad stand");
-    assert_int_equal(controller_make("zeros", &def, &controller, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "controller zeros zero");
+    assert_refused(controller_check("stnad", &error), MILD_ERROR_ARGUMENT, &error,
+                   "controller stnad stand");
+    assert_refused(controller_make("zeros", &def, &controller, &error), MILD_ERROR_ARGUMENT, &error,
+                   "controller zeros zero");
     assert_null(controller.self);
 }
 

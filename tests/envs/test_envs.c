@@ -141,8 +141,8 @@ TEST(batch_engine) {
     const float action[ENVS][SA01_JOINTS] = {{0}};
     EnvsStep step = step_of(action[0], &b);
     step.last = view_of(&last);
-    assert_int_equal(mild_envs_step(engine, &step, NULL, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "train.robots mujoco");
+    assert_refused(mild_envs_step(engine, &step, NULL, &error), MILD_ERROR_ARGUMENT, &error,
+                   "train.robots mujoco");
     mild_envs_close(mujoco);
     mild_envs_close(engine);
 }

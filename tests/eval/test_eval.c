@@ -48,15 +48,13 @@ TEST(courses_have_bounds) {
     assert_int_equal(mild_terrain_material_at(&scene.terrain, -1.4, 0), 0);
     assert_int_equal(mild_terrain_material_at(&scene.terrain, 900, 0), 0);
     strcat(text, "+grass");
-    assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "12");
+    assert_refused(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT, &error, "12");
     memset(text, 'x', sizeof text);
     text[sizeof scene.name] = 0;
-    assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "ground");
+    assert_refused(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT, &error, "ground");
     text[sizeof scene.name - 1] = 0;
-    assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "ground rigid");
+    assert_refused(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT, &error,
+                   "ground rigid");
 }
 
 /* Turns back to world x by 1 rad/s per radian, at most 0.5 rad/s, and not while standing. */

@@ -248,8 +248,7 @@ static void check_end(const char *how, const char *names) {
     for (int k = 0; k < 2; k++) {
         assert_int_equal(ground[1].solve(ground[1].self, NULL, NULL, &input, &result), 1);
     }
-    assert_int_equal(other_ground_stop(other, MILD_OK, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, names);
+    assert_refused(other_ground_stop(other, MILD_OK, &error), MILD_ERROR_IO, &error, names);
 }
 
 TEST(ends_are_reported) {
@@ -265,8 +264,8 @@ TEST(ends_are_reported) {
     assert_int_equal(error.status, MILD_OK);
     other = other_ground_start("exit 3", robot, 3, &error);
     assert_non_null(other);
-    assert_int_equal(other_ground_stop(other, MILD_OK, &error), MILD_ERROR_IO);
-    assert_error(&error, MILD_ERROR_IO, "--program trial 0 failed");
+    assert_refused(other_ground_stop(other, MILD_OK, &error), MILD_ERROR_IO, &error,
+                   "--program trial 0 failed");
 }
 
 /* A child has its standard files and what this program leaves open for anyone, not another's ends.

@@ -240,8 +240,8 @@ TEST(test_patterns) {
     assert_int_equal(mild_terrain_material_at(&terrain, 0.1, 0.0),
                      5); /* a patch wins over the map */
     terrain.material_count = 2;
-    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, "terrain.map label 2");
+    assert_refused(mild_terrain_set_map(&terrain, map, &error), MILD_ERROR_ARGUMENT, &error,
+                   "terrain.map label 2");
     mild_map_destroy(map);
 
     def.patches = MILD_PATTERN_CHECKER;

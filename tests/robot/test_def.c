@@ -485,8 +485,7 @@ TEST(test_lists_that_fit) {
 static void refuse_folder(const char *folder, MildStatus status, const char *names) {
     static RobotDef def;
     MildError error = {0};
-    assert_int_equal(robot_def_read(folder, &def, &error), status);
-    assert_error(&error, status, names);
+    assert_refused(robot_def_read(folder, &def, &error), status, &error, names);
 }
 
 TEST(test_files) {

@@ -123,8 +123,8 @@ TEST(test_on_error) {
     signal(SIGABRT, SIG_DFL);
     Work work = {.text = "inside"};
     MildError error = {0};
-    assert_int_equal(engine_call(do_work, &work, "it", &error), MILD_ERROR_MEMORY);
-    assert_error(&error, MILD_ERROR_MEMORY, "it MuJoCo inside");
+    assert_refused(engine_call(do_work, &work, "it", &error), MILD_ERROR_MEMORY, &error,
+                   "it MuJoCo inside");
     assert_string_equal(heard, "out of"); /* the call's errors are the call's */
 }
 

@@ -455,8 +455,7 @@ TEST(elements_cover_the_sole) {
 static void refuse(int robot, int elements, MildStatus status, const char *named) {
     MildError error = {0};
     const MildSole *before = robot_soles(robots[robot])[0];
-    assert_int_equal(robot_set_elements(robots[robot], elements, &error), status);
-    assert_error(&error, status, named);
+    assert_refused(robot_set_elements(robots[robot], elements, &error), status, &error, named);
     assert_ptr_equal(robot_soles(robots[robot])[0], before);
 }
 

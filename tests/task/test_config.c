@@ -119,12 +119,12 @@ TEST(gains) {
         TaskDef def = task_def_default();
         MildError error = {0};
         strcpy(def.kp, wrong[i]);
-        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
-        assert_error(&error, MILD_ERROR_RANGE, "task.kp");
+        assert_refused(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE, &error,
+                       "task.kp");
         def = task_def_default();
         strcpy(def.kd, wrong[i]);
-        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
-        assert_error(&error, MILD_ERROR_RANGE, "task.kd");
+        assert_refused(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE, &error,
+                       "task.kd");
     }
 }
 
@@ -144,8 +144,8 @@ TEST(torque_limits) {
     for (int i = 0; i < 6; i++) {
         MildError error = {0};
         strcpy(def.torque_share, wrong[i]);
-        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
-        assert_error(&error, MILD_ERROR_RANGE, "task.torque_share");
+        assert_refused(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE, &error,
+                       "task.torque_share");
     }
 }
 

@@ -231,8 +231,8 @@ TEST_WITH(test_config, make_folder, remove_folder) {
     assert_int_equal(
         log_config(log, "[train]\nenvs = 64\nvx = 0 1.2\n\n[ppo]\nmirror = true\n", &error),
         MILD_OK);
-    assert_int_not_equal(log_config(log, "[train]\nenvs\n", &error), MILD_OK);
-    assert_error(&error, MILD_ERROR_FORMAT, "config.ini:2");
+    assert_refused(log_config(log, "[train]\nenvs\n", &error), MILD_ERROR_FORMAT, &error,
+                   "config.ini:2");
     log_close(log);
     char path[PATH_SIZE];
     find_events(path);

@@ -162,14 +162,13 @@ TEST(another_robots_policy_is_refused) {
     assert_int_equal(policy_save(train_policy(go1), POLICY, "test", &error), MILD_OK);
     assert_int_equal(controller_learned(POLICY, robot[0], NULL, 1, &controller, &error), MILD_OK);
     controller_destroy(&controller);
-    assert_int_equal(controller_learned(POLICY, robot[1], NULL, 1, &controller, &error),
-                     MILD_ERROR_FORMAT);
-    assert_error(&error, MILD_ERROR_FORMAT, POLICY " go1 sa01");
+    assert_refused(controller_learned(POLICY, robot[1], NULL, 1, &controller, &error),
+                   MILD_ERROR_FORMAT, &error, POLICY " go1 sa01");
     assert_null(controller.self);
     assert_int_equal(train_save(go1, CHECKPOINT, "test", &error), MILD_OK);
     assert_int_equal(train_load(go1, CHECKPOINT, &error), MILD_OK);
-    assert_int_equal(train_load(sa01, CHECKPOINT, &error), MILD_ERROR_ARGUMENT);
-    assert_error(&error, MILD_ERROR_ARGUMENT, CHECKPOINT " robot go1 sa01");
+    assert_refused(train_load(sa01, CHECKPOINT, &error), MILD_ERROR_ARGUMENT, &error,
+                   CHECKPOINT " robot go1 sa01");
     unlink(POLICY);
     unlink(CHECKPOINT);
     robot_destroy(robot[0]);
@@ -190,9 +189,8 @@ TEST(a_policy_without_a_name_loads) {
     Controller controller = {0};
     assert_int_equal(controller_learned(POLICY, sa01, NULL, 1, &controller, &error), MILD_OK);
     controller_destroy(&controller);
-    assert_int_equal(controller_learned(POLICY, go1, NULL, 1, &controller, &error),
-                     MILD_ERROR_FORMAT);
-    assert_error(&error, MILD_ERROR_FORMAT, POLICY " 11 estimates go1");
+    assert_refused(controller_learned(POLICY, go1, NULL, 1, &controller, &error), MILD_ERROR_FORMAT,
+                   &error, POLICY " 11 estimates go1");
     unlink(POLICY);
     policy_destroy(policy);
     robot_destroy(go1);
