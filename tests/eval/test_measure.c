@@ -187,49 +187,6 @@ static void lift(Script *s, int f, double height) {
     s->sample.foot[f].height = height;
 }
 
-/* A stance that creeps 3 mm forward and 4 mm aside and is 12 mm deep in its middle, then a swing of
- * 50 mm: drift 5 mm, penetration 12 mm, clearance 50 mm. The other foot stands all the time. */
-TEST(one_stance_and_one_swing) {
-    for (int f = 0; f < SA01_FEET; f++) {
-        Script s;
-        Measure m;
-        script_start(&s);
-        measure_start(&m, DT);
-        set_foot(&s, f, 100, 0.2, -0.1, 0.004);
-        hold(&m, &s, 100);
-        set_foot(&s, f, 100, 0.21, -0.1, 0.012); /* on the way the sole may be anywhere */
-        hold(&m, &s, 100);
-        set_foot(&s, f, 100, 0.203, -0.096, 0.006);
-        hold(&m, &s, 100);
-        s.sample.foot[f].center[0] = 0.3; /* in the air it moves on */
-        lift(&s, f, 0.02);
-        hold(&m, &s, 100);
-        lift(&s, f, 0.05);
-        hold(&m, &s, 100);
-        lift(&s, f, 0.01);
-        hold(&m, &s, 100);
-        assert_int_equal(m.stances, 1);
-        assert_int_equal(m.swings, 0); /* it has not landed */
-        expect_near("drift", m.drift_sum, 0.005, 1e-15);
-        expect_near("penetration", m.deepest_sum, 0.012, 0);
-        set_foot(&s, f, 100, 0.5, -0.1, 0.001);
-        hold(&m, &s, 100);
-        assert_int_equal(m.swings, 1);
-        expect_near("clearance", m.apex_sum, 0.05, 0);
-        lift(&s, f, 0.03);
-        hold(&m, &s, 100); /* the second stance begins anew: no drift, 1 mm deep */
-        assert_int_equal(m.stances, 2);
-        expect_near("drift of two", m.drift_sum, 0.005, 1e-15);
-        expect_near("penetration of two", m.deepest_sum, 0.013, 1e-15);
-        set_foot(&s, f, 100, 0.6, -0.1, 0);
-        hold(&m, &s, 1);
-        assert_int_equal(m.swings, 2);
-        expect_near("clearance of two", m.apex_sum, 0.08, 1e-15);
-        measure_finish(&m); /* the other foot's open stance does not count */
-        assert_int_equal(m.stances, 2);
-    }
-}
-
 /* The same stances one by one, of a robot that looks 0.5 rad to the left: of 3 mm along x and 4 mm
  * along y. */
 TEST(stances_are_kept) {
@@ -487,21 +444,6 @@ TEST(the_apex_before_a_stance) {
         expect_near("apex", m->kept[i].apex, apex[i], 0);
     }
     measure_free(m, 1);
-}
-
-/* Who starts in the air has no stance to end; the first landing may end a swing. */
-TEST(a_foot_that_starts_in_the_air) {
-    Script s;
-    Measure m;
-    script_start(&s);
-    measure_start(&m, DT);
-    lift(&s, 0, 0.03);
-    lift(&s, 1, -0.02); /* sunk and unloaded: no height above the ground */
-    hold(&m, &s, 200);
-    assert_true(m.stances == 0 && m.swings == 0);
-    script_start(&s);
-    hold(&m, &s, 1);
-    assert_true(m.stances == 0 && m.swings == 1 && m.apex_sum == 0.03);
 }
 
 /* Never lifted: both stances count as they are at the end, once. */
