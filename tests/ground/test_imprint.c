@@ -137,26 +137,6 @@ TEST(test_against_an_array) {
     stamp_close(&stamp);
 }
 
-/* Eight tiles are a set. A ninth takes the place of the one that was changed longest ago, of which
- * nothing is left. */
-TEST(test_the_oldest_goes) {
-    static const double kept[8] = {1.5e-3, 0.0, 3e-3, 4e-3, 5e-3, 6e-3, 7e-3, 8e-3};
-    Stamp stamp;
-    stamp_open(&stamp, 8);
-    for (int n = 0; n < 8; n++) { /* in one corner of each */
-        stamp_press(&stamp, (n + 0.75) * EDGE, 0.75 * EDGE, 0.0, 1e-3 * (n + 1));
-    }
-    stamp_press(&stamp, 0.75 * EDGE, 0.75 * EDGE, 0.0, 1.5e-3); /* the first is changed again */
-    stamp_press(&stamp, 0.25 * EDGE, 1.25 * EDGE, 0.0, 0.02);   /* in another corner */
-    for (int n = 0; n < 8; n++) {
-        const double depth = stamp_at(&stamp, (n + 0.76) * EDGE, 0.76 * EDGE);
-        assert_true(fabs(depth - kept[n]) < 1e-9);
-    }
-    assert_true(fabs(stamp_at(&stamp, 0.26 * EDGE, 1.26 * EDGE) - 0.02) < 1e-9);
-    assert_true(stamp_at(&stamp, 0.76 * EDGE, 1.76 * EDGE) == 0.0);
-    stamp_close(&stamp);
-}
-
 /* Several sets hold more: of 40 tiles in 128 none is lost when no set gets more than eight. */
 TEST(test_sets) {
     Stamp stamp;

@@ -195,17 +195,6 @@ TEST(test_foot_keys) {
     assert_true(def.mirror_shift == 0);
 }
 
-/* A foot may be its own mirror image: a hopper. */
-TEST(test_one_foot) {
-    const char *at = strstr(plain, "[foot.r]");
-    snprintf(edited, sizeof edited, "%.*s", (int)(at - plain), plain);
-    char *mirror = strstr(edited, "mirror = r\n");
-    mirror[9] = 'l';
-    RobotDef def = accept(edited);
-    assert_int_equal(def.feet, 1);
-    assert_true(def.mirror_shift == 0);
-}
-
 TEST(test_reading) {
     accept(edit("height = 0.7 ; [m]\n", "height = 0.7\t# [m]\r\n\n   \r"));
     accept(edit("[joints]\n", "[joints] ; of all\n"));
