@@ -141,11 +141,12 @@ def summary(rows):
                 ends[end] = ends.get(end, 0) + n
     asked = [c for c in cells if c["axes"]]
     off = [(abs(error / command), c["where"][0], command, command + error) for c in asked for command, error in c["axes"] if error is not None]
+    shares = [1 + error / command for command, error in (c["axes"][-1] for c in asked) if error is not None]  # sideways or turning where asked
     good = [c for c in asked if all(error is not None and abs(error / command) <= 0.05 for command, error in c["axes"])]
     costs = [c["cot"] for c in cells if c["cot"] is not None]
     legs = min(((c["legs"], *c["where"]) for c in cells if c["legs"] is not None), default=None)
     return {"upright": sum(c["upright"] for c in cells), "trials": sum(c["trials"] for c in cells), "ends": ends,
-            "within": len(good), "asked": len(asked), "share": sum(is_ / command for _, _, command, is_ in off) / len(off) if off else None,
+            "within": len(good), "asked": len(asked), "share": sum(shares) / len(shares) if shares else None,
             "worst": list(max(off)[1:]) if off else None,
             "cot": [min(costs), max(costs)] if costs else None, "torque": max(c["torque"] for c in cells),
             "target_jump": max((c["target_jump"] for c in cells if c["target_jump"] is not None), default=None),

@@ -370,7 +370,7 @@ class Walker:
 
 
 class Measure:
-    """What one walk is judged by, from step to step; definitions as in mild eval (docs/task.md)."""
+    """What one walk is judged by, from step to step; definitions as in mild eval (docs/schema/eval.json)."""
 
     def __init__(self, walker):
         self.r, self.d, self.ground = walker.robot, walker.data, walker.ground

@@ -19,13 +19,14 @@
 #include "view/relief.h"
 
 #define GRAVITY 9.81
-#define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
-#define AREA_ASIDE 0.2    /* [m] aside, for each metre of it: nobody holds the heading */
-#define WINDOW_AREA 12.0  /* [m] ground drawn around the start of a window's walk */
-#define COURSE_EXTRA 3.0  /* [s] a course gets for starting and stopping */
-#define COURSE_LEAST 12.0 /* [s] */
-#define SQUARE_MARGIN 8.0 /* [m] ground drawn around a square of robots */
-#define SQUARE_TILE 1.3   /* [m] edge of a tile of its picture, at most */
+#define AREA_MARGIN 2.0    /* [m] ground drawn beyond the walk */
+#define AREA_ASIDE 0.2     /* [m] aside, for each metre of it: nobody holds the heading */
+#define AREA_ASIDE_MAX 8.0 /* [m] */
+#define WINDOW_AREA 12.0   /* [m] ground drawn around the start of a window's walk */
+#define COURSE_EXTRA 3.0   /* [s] a course gets for starting and stopping */
+#define COURSE_LEAST 12.0  /* [s] */
+#define SQUARE_MARGIN 8.0  /* [m] ground drawn around a square of robots */
+#define SQUARE_TILE 1.3    /* [m] edge of a tile of its picture, at most */
 /* The camera goes from near the first robot to where all can be seen. */
 #define SQUARE_NEAR 5.0     /* [m] from it */
 #define SQUARE_LOW (-16.0)  /* [deg] */
@@ -174,7 +175,8 @@ static MildStatus make_view(Command *c, MildError *error) {
     def.window = play->window;
     def.x_min = play->window ? -WINDOW_AREA : fmin(reach, 0) - AREA_MARGIN;
     def.x_max = play->window ? WINDOW_AREA : fmax(reach, 0) + AREA_MARGIN;
-    def.y_min -= AREA_ASIDE * fabs(reach), def.y_max += AREA_ASIDE * fabs(reach);
+    const double aside = fmin(AREA_ASIDE * fabs(reach), AREA_ASIDE_MAX);
+    def.y_min -= aside, def.y_max += aside;
     if (play->window) {
         def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
     }

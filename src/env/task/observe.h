@@ -1,4 +1,4 @@
-/* Observations (docs/task.md section 5). One frame:
+/* Observations (docs/policy.md section 3). One frame:
  *   0..2   base angular velocity, base frame [rad/s]
  *   3..5   command (vx, vy, wz) times (2, 2, 1)
  *   6..8   unit gravity in the base frame

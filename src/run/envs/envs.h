@@ -35,7 +35,7 @@ typedef struct MildEnvs MildEnvs;
 typedef struct {
     int envs;        /* environments */
     int actions;     /* of each, one per joint */
-    int observation; /* numbers of a frame, docs/task.md section 5 */
+    int observation; /* numbers of a frame, docs/policy.md section 3 */
     int frames;      /* of a history: means of older frames, the newest frame last */
     int critic;      /* numbers of what only a critic may see */
     int estimates;   /* numbers of true velocities and heights, which an estimator regresses on */
