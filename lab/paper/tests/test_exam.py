@@ -28,16 +28,17 @@ def row(ground, speed, velocity, trials, sideways=0.0, left=0.0):
 def lines():
     rows = [row("rubber", 0.5, 0.49, [("time", 40, 0.02), ("time", 50, 0.01)]), row("snow", -0.5, -0.9, [("base", 80, -0.01), ("tilt", 70, None)]),
             row("snow", 0, 0.4, [("time", 30, 0.03), ("base", 20, 0.04)]), row("foam45", 0.9, None, [("time", 10, None)]),
-            row("grass", 0, 0.01, [("time", 30, 0.03)], 0.2, 0.18)]
+            row("grass", 0.5, 0.5, [("time", 30, 0.03)], 0.2, 0.18)]
     assert rows[0]["error"] == 0.49 - 0.5 and rows[1]["error"] is None and rows[3]["error"] is None and abs(rows[4]["error_sideways"] + 0.02) < 1e-12
     s = exam.summary(rows)
     assert (s["upright"], s["trials"], s["ends"]) == (5, 8, {"base": 2, "tilt": 1})
     assert (s["within"], s["asked"]) == (1, 4)  # who fell or was not measured is not within; who stands is asked for nothing
+    assert abs(s["share"] - (0.98 + 0.9) / 2) < 1e-12  # of who goes sideways, that
     assert s["worst"] == ["grass", 0.2, 0.18] and s["cot"] == [-0.5, 0.9] and s["torque"] == 80 and s["target_jump"] == 1.9
     assert (s["legs"], s["legs_at"]) == (-0.01, ["snow", -0.5])
     assert s["fell"] == [["snow", -0.5, 2], ["snow", 0, 1]]
     report = exam.line("what", s)
-    for part in ("5 of 8", "1/4", "+0.180 for +0.20 on grass", "80 N m", "1.90 rad", "-10 mm on snow@-0.5", "2 base", "1 tilt", "snow@-0.5:2, snow@0:1"):
+    for part in ("5 of 8", "1/4", "94 %", "+0.180 for +0.20 on grass", "80 N m", "1.90 rad", "-10 mm on snow@-0.5", "2 base", "1 tilt", "snow@-0.5:2, snow@0:1"):
         assert part in report, (part, report)
 
 
