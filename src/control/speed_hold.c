@@ -6,7 +6,7 @@
 #define ERROR_MAX 0.5   /* [-] of the speed of one cycle */
 #define SPEED_MIN 0.1   /* [m/s, rad/s] of a command whose ratio can be learned */
 #define CHANGE_MAX 0.01 /* [m/s, rad/s] of the command that begins anew */
-#define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r of the way can learn from */
+#define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r of the speeds can learn from */
 #define SETTLING 2      /* cycles after that */
 #define YAW_RATE 2      /* place in a frame [rad/s] */
 
@@ -37,7 +37,7 @@ static void learn(SpeedHold *hold, int part, double gain) {
 
 static void pass_cycle(SpeedHold *hold, double gain) {
     for (int part = 0; part < SPEED_HOLD_PARTS; part++) {
-        const int useless = part == SPEED_HOLD_WAY && hold->turning;
+        const int useless = part == SPEED_HOLD_LINEAR && hold->turning;
         if (hold->begun && hold->settling[part] == 0 && !useless) {
             learn(hold, part, gain);
         }

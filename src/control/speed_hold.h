@@ -20,7 +20,7 @@ typedef struct {
 } SpeedHoldDef;
 
 /* Those of a command that change apart: its first two numbers, and its third. */
-enum { SPEED_HOLD_WAY, SPEED_HOLD_TURN, SPEED_HOLD_PARTS };
+enum { SPEED_HOLD_LINEAR, SPEED_HOLD_TURN, SPEED_HOLD_PARTS };
 
 /* Of one robot; zeros before the first frame. */
 typedef struct {

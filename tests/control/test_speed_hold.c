@@ -60,13 +60,13 @@ TEST(a_slow_walk_comes_to_its_speed) {
 /* The factor is the same in each cycle; its weight grows. */
 TEST(doubt_ends_after_a_few_cycles) {
     Walker w = walker_at(0.5, 0.9);
-    while (w.hold.cycles[SPEED_HOLD_WAY] == 0) {
+    while (w.hold.cycles[SPEED_HOLD_LINEAR] == 0) {
         walk(&w, 1);
     }
     for (int n = 1; n <= 5; n++) {
         const double weight = n * n / (n * n + 1.0);
         expect_near("ratio", w.hold.ratio[0], 1 / (1 - 0.1 * weight) - 1, 0.002);
-        assert_int_equal(w.hold.cycles[SPEED_HOLD_WAY], n);
+        assert_int_equal(w.hold.cycles[SPEED_HOLD_LINEAR], n);
         walk(&w, CYCLE);
     }
 }
@@ -161,7 +161,7 @@ TEST(standing_forgets) {
     walk(&w, CYCLE * 10);
     assert_true(w.hold.ratio[0] != 0);
     speed_hold(&w.hold, &w.def, frame, estimates, command);
-    assert_true(w.hold.ratio[0] == 0 && w.hold.cycles[SPEED_HOLD_WAY] == 0);
+    assert_true(w.hold.ratio[0] == 0 && w.hold.cycles[SPEED_HOLD_LINEAR] == 0);
     assert_true(command[0] == 0 && command[1] == 0 && command[2] == 0.3);
 }
 

@@ -82,7 +82,7 @@ static void walk(double gain, int scan, double seconds) {
 TEST(commands_are_those_of_a_speed_hold) {
     walk(0.1, 0, 14);
     for (int i = 0; i < TRIALS; i++) {
-        assert_true(hold[i].cycles[SPEED_HOLD_WAY] > 5);
+        assert_true(hold[i].cycles[SPEED_HOLD_LINEAR] > 5);
         assert_true(last[i] != SPEED && fabs(last[i] / SPEED - 1) < 0.15);
     }
 }
@@ -91,7 +91,7 @@ TEST(commands_are_those_of_a_speed_hold) {
 TEST(also_of_a_policy_that_sees) {
     walk(0.1, 3, 6);
     for (int i = 0; i < TRIALS; i++) {
-        assert_true(hold[i].cycles[SPEED_HOLD_WAY] > 1 && last[i] != SPEED);
+        assert_true(hold[i].cycles[SPEED_HOLD_LINEAR] > 1 && last[i] != SPEED);
     }
     unlink(SEEING);
 }

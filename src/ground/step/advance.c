@@ -30,10 +30,10 @@ MILD_HD int slot_stays(const Slots *s, int i, Real m1, int prints) {
 /* A loaded element writes its depth into the ground where it lifts off, less what flows back there,
  * and in every cell that it slides out of. Where it slides into an imprint that is deeper than all
  * of its sole it takes over that depth. A greater depth never means more force, and an element
- * takes a lesser one while it carries nothing, so this adds no energy. A lesser imprint may be that
- * of a neighbour: an element that had to reach it first would strike all of the added mass again,
- * from rest, in every cell. v: its velocity in the frame of the foot. refill: [-] of the material.
- */
+ * takes a lesser one while it carries nothing, so this adds no energy. A shallower imprint may be
+ * what a neighbour has just left: who took it over would strike all of the added mass again, from
+ * rest, in every cell. v: the element's velocity in the frame of the foot. refill: [-] of the
+ * material. */
 static void element_imprint(const Advance *a, const Memory *memory, const Slots *s, int i, int e,
                             const SlotVelocity *v, int lifted, double refill) {
     if (!(s->recovery[i] < 1.0)) {
