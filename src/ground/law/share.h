@@ -276,12 +276,12 @@ MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *a
     return stays ? 1 - q : 0;
 }
 
-/* element_slide and element_wear where nothing is in vectors. */
+/* element_slide and element_wear where nothing is in vectors. presses: frame_presses (frame.h). */
 MILD_HD Real element_wear_alone(const Element *e, const ElementMemory *memory, const Share *share,
                                 ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
-                                Real speed, int stays) {
+                                Real speed, Real presses, int stays) {
     const Real slid = element_slide(e, memory, share, after, dt, normal, vx, vy, stays);
-    const Real fresh = element_fresh(e, dt, speed);
+    const Real fresh = element_fresh(e, dt, speed) * presses;
     if (stays && (share_slips(share, slid) || share_regains(share, slid, fresh))) {
         return element_wear(e, share, after, slid, fresh, stays);
     }
