@@ -149,8 +149,7 @@ class Foot:
         before, after = ((V[:3] + np.cross(V[3:], p)) @ Q for V in (twist, new_twist))
         e = types.SimpleNamespace(u0=-(position[2] + p[:, 2]), w0=-before[:, 2], w=-after[:, 2], v0=before[:, :2], v=after[:, :2])
         e.sinks = -after @ Q[2] - e.w  # how much faster the depth grows than the way along the normal
-        presses = e.w - (1 - TURN) / TURN * (e.v @ Q[:2, 2])  # along the normal of the sole
-        e.presses = np.where((e.w > 0) & (presses < e.w), np.maximum(presses, 0) / np.where(e.w > 0, e.w, 1), 1)
+        e.slices = np.maximum((1 - TURN) / TURN * (e.v @ Q[:2, 2]), 0)  # along the sole's slope
         e.m0 = np.where(self.middle > 0, self.middle, e.u0 - dt * e.w0 / 2)
         e.m1 = e.u0 + dt * e.w / 2
         e.a = np.maximum(np.maximum(e.m0, self.u_max), 0)
@@ -266,8 +265,9 @@ class Foot:
         self.drift = np.where(counted, np.minimum(self.drift + length, LONGEST), self.drift)
         self.pending[counted] = 0
         line = e.a - e.u_z  # shorter than the elastic travel where ground is stiffer than its chord, and in the first 0.1 mm
-        e.regains = (e.m1 > e.a) & (law.recovery * e.a <= ELASTIC) & (line >= e.q * ELASTIC * (1 - 1e-6))
-        return np.where(e.regains, e.c - (e.c - q) * np.exp(-e.presses * np.maximum(e.m1 - e.a, 0) / (law.regain_length * growth)), q)
+        fresh = np.maximum(e.m1 - e.a - self.dt * e.slices, 0)
+        e.regains = (fresh > 0) & (law.recovery * e.a <= ELASTIC) & (line >= e.q * ELASTIC * (1 - 1e-6))
+        return np.where(e.regains, e.c - (e.c - q) * np.exp(-fresh / (law.regain_length * growth)), q)
 
     def remember(self, e):
         """Sections 5, 6 and 22: the memory after the step; all but `middle` is forgotten above the surface."""

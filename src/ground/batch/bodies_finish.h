@@ -113,7 +113,7 @@ MILD_HD void bodies_finish_element(const BodiesSetup *setup, const BodiesWork *w
     after = element_sunk(after, sinks, stays);
     if (own.curves & LAW_HEAP) {
         worn = element_wear_alone(e, &own.before, &own.share, &after, dt, normal, v.x, v.y,
-                                  v.descent, frame_presses(own.frame, v.x, v.y, v.descent), stays);
+                                  v.descent, frame_slices(own.frame, v.x, v.y), stays);
     }
     if (stays) {
         const Real peak = element_peak(e, own.curves, normal, v.descent, middle);

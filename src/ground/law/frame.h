@@ -81,12 +81,11 @@ MILD_HD Real frame_sinks(const Real v[3], Real slope_x, Real slope_y, Real x, Re
     return slope_x * world[0] + slope_y * world[1] - world[2] - descent;
 }
 
-/* [-] Share of the way along e that is along the normal of the sole, too, which in the frame is
- * along e + v x e (1 - t)/t. The rest slices: the ground that it reaches is not fresh. */
-MILD_HD Real frame_presses(const Real v[3], Real x, Real y, Real descent) {
-    const Real more = (1 - FRAME_TURN) / FRAME_TURN;
-    const Real along = descent - more * (v[1] * x - v[0] * y);
-    return descent > 0 && along < descent ? real_max(along, 0) / descent : 1;
+/* [m/s] By how much an element moves less along the normal of the sole than along e. The normal is,
+ * in the frame, e + v x e (1 - t)/t. A sole that slices along its own slope reaches no fresh
+ * ground. */
+MILD_HD Real frame_slices(const Real v[3], Real x, Real y) {
+    return real_max((1 - FRAME_TURN) / FRAME_TURN * (v[1] * x - v[0] * y), 0);
 }
 
 #endif

@@ -249,9 +249,9 @@ MILD_HD Real element_slide(const Element *e, const ElementMemory *memory, const 
     return slid;
 }
 
-/* [m] Penetration of a step beyond the yield depth. */
-MILD_HD Real element_fresh(const Element *e, Real dt, Real speed) {
-    return real_max(e->depth + dt / 2 * speed - e->yield_depth, 0);
+/* [m] Penetration of a step beyond the yield depth. slices: frame_slices (frame.h). */
+MILD_HD Real element_fresh(const Element *e, Real dt, Real speed, Real slices) {
+    return real_max(e->depth + dt * (speed / 2 - slices) - e->yield_depth, 0);
 }
 
 /* Bool: slip lowers the share in a step. */
@@ -276,12 +276,12 @@ MILD_HD Real element_wear(const Element *e, const Share *share, ElementMemory *a
     return stays ? 1 - q : 0;
 }
 
-/* element_slide and element_wear where nothing is in vectors. presses: frame_presses (frame.h). */
+/* element_slide and element_wear where nothing is in vectors. slices: frame_slices (frame.h). */
 MILD_HD Real element_wear_alone(const Element *e, const ElementMemory *memory, const Share *share,
                                 ElementMemory *after, Real dt, Real normal, Real vx, Real vy,
-                                Real speed, Real presses, int stays) {
+                                Real speed, Real slices, int stays) {
     const Real slid = element_slide(e, memory, share, after, dt, normal, vx, vy, stays);
-    const Real fresh = element_fresh(e, dt, speed) * presses;
+    const Real fresh = element_fresh(e, dt, speed, slices);
     if (stays && (share_slips(share, slid) || share_regains(share, slid, fresh))) {
         return element_wear(e, share, after, slid, fresh, stays);
     }

@@ -212,8 +212,7 @@ MILD_HD void blocks_advance(const Advance *a, const Slots *first, const Slots *e
                 const Share share = slot_share(s, i);
                 slid[i] =
                     element_slide(&element, &before, &share, &after, dt, s->iz[i], v.x, v.y, stays);
-                fresh[i] = element_fresh(&element, dt, v.descent) *
-                           frame_presses(frame, v.x, v.y, v.descent);
+                fresh[i] = element_fresh(&element, dt, v.descent, frame_slices(frame, v.x, v.y));
                 const Real slips = share_slips(&share, slid[i]) ? REAL(1) : 0;
                 const Real most =
                     share_regains(&share, slid[i], fresh[i]) ? SLOT_LANES + REAL(1) : slips;
