@@ -193,9 +193,9 @@ int cmd_bench(int argc, char **argv) {
         .positional_max = BENCHES,
     };
     CliArgs args;
-    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     int bad = check_names(&args);
     if (bad) {

@@ -467,9 +467,9 @@ int cmd_drive(int argc, char **argv) {
             "  mild drive --simulate --ground sand_loose    # in another terminal\n"
             "  mild drive --listen 0.0.0.0:9870 --gamepad /dev/input/js0 --json drive.json\n",
     };
-    const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     int bad = refuse_other_half(&command, &args, d.simulate);
     bad = bad ? bad : cli_refuse_dash("drive", "log", d.log);

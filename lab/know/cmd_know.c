@@ -433,9 +433,9 @@ static int parse_and_run(Know *k, CliArgs *args, int argc, char **argv) {
                     "  mild know --grounds 6000 --changes 0.35 --quiet 0.2 --seed 1 --walks "
                     "walks.npy\n",
     };
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     MildError error = {0};
     const int code = cli_refuse_dash("know", "walks", k->walks);

@@ -380,19 +380,19 @@ const char *cli_first_given(const CliCommand *command, const CliArgs *args,
     return NULL;
 }
 
-CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args) {
+int cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args) {
     args->positional_count = args->override_count = 0;
     args->given = 0;
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
             print_command_help(command);
-            return CLI_DONE;
+            return 0;
         }
     }
     for (int i = 1; i < argc; i++) {
         if (take_word(command, argc, argv, &i, args)) {
-            return CLI_BAD;
+            return CLI_EXIT_BAD_INPUT;
         }
     }
-    return claim_outputs(command) ? CLI_BAD : CLI_RUN;
+    return claim_outputs(command) ? CLI_EXIT_BAD_INPUT : CLI_RUN;
 }

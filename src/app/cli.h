@@ -85,11 +85,10 @@ typedef struct {
     char joined[CLI_OVERRIDES_MAX][160]; /* storage of overrides given as two words */
 } CliArgs;
 
-typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
-
-/* Parses argv[1..]. CLI_DONE: the help was printed, exit with 0. CLI_BAD: an error was printed to
- * stderr, exit with CLI_EXIT_BAD_INPUT. */
-CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
+enum { CLI_RUN = -1 };
+/* Parses argv[1..]. Returns CLI_RUN, or the exit code of a command that ends here: 0 after its
+ * help, CLI_EXIT_BAD_INPUT after an error. Both were printed. */
+int cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
 
 /* The first of the options that is on the line, or NULL. names: without dashes, ended by NULL. */
 const char *cli_first_given(const CliCommand *command, const CliArgs *args,

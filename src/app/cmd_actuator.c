@@ -154,9 +154,9 @@ static int cmd_fit_actuator(int argc, char **argv) {
         .numbers = NUMBERS_END,
     };
     CliArgs args;
-    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     const int bad = cli_refuse_dash(command.name, "out", c.out);
     if (bad) {
@@ -263,9 +263,9 @@ static int cmd_log_actuator(int argc, char **argv) {
                     "  mild actuator log --out other.csv --seed 2 --coulomb 0.05\n",
     };
     CliArgs args;
-    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     MildError error = {0};
     return run_log(&c, &args, &error) == MILD_OK ? 0 : cli_fail("actuator log", &error);
@@ -299,9 +299,9 @@ int cmd_actuator(int argc, char **argv) {
         return cmd_log_actuator(argc - 1, argv + 1);
     }
     CliArgs args;
-    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     return cli_fail_text("actuator", "'%.40s' is neither fit nor log; see mild actuator --help",
                          args.positional_count ? args.positional[0] : "");

@@ -614,9 +614,8 @@ int cmd_eval(int argc, char **argv) {
             "  mild eval --robot go1 --start back\n"
             "  mild eval --train.device=cuda --trials 1000\n",
     };
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
-    if (outcome == CLI_RUN) {
+    int code = cli_parse(&command, argc, argv, args);
+    if (code == CLI_RUN) {
         MildError error = {0};
         e->speed_given =
             cli_first_given(&command, args, (const char *const[]){"speed", NULL}) != NULL;

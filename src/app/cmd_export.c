@@ -83,9 +83,9 @@ int cmd_export(int argc, char **argv) {
                     "  mild export --c deploy && cc -O3 -march=native deploy/*.c -lm -o run\n",
     };
     static CliArgs args;
-    const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     if (!e.onnx && !e.c) {
         return cli_fail_text("export", "nothing to write; give --onnx FILE or --c FOLDER");

@@ -100,11 +100,7 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
         .picture = "figure",
         .numbers = NUMBERS_END,
     };
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome == CLI_BAD) {
-        return CLI_EXIT_BAD_INPUT;
-    }
-    return outcome == CLI_DONE ? -1 : 0;
+    return cli_parse(&command, argc, argv, args);
 }
 
 /* ---- what is fitted and what is held ---- */
@@ -652,9 +648,9 @@ static int walk_fit(const FitOptions *options, const CliArgs *args) {
 int cmd_fit(int argc, char **argv) {
     FitOptions options = {0};
     CliArgs args;
-    int code = options_read(argc, argv, &options, &args);
-    if (code) {
-        return code < 0 ? 0 : code;
+    const int parsed = options_read(argc, argv, &options, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     if (!args.positional_count) {
         return cli_fail_text(

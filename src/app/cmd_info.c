@@ -324,9 +324,9 @@ int cmd_info(int argc, char **argv) {
         .positional_max = 1,
     };
     CliArgs args;
-    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     if (!args.positional_count) {
         return cli_fail_text("info", "no topic given; use mild info %s", command.usage);

@@ -517,9 +517,9 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
                     "--terrain.patches=checker --terrain.patch_size=3 --seconds 6 --video "
                     "patchwork.mp4\n",
     };
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     MildError error = {0};
     int code = cli_refuse_dash("play", "video", c->video);

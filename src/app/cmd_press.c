@@ -331,8 +331,8 @@ static const char examples[] =
     "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
-static CliOutcome options_parse(const CliOption *table, int count, int argc, char **argv,
-                                CliArgs *args) {
+static int options_parse(const CliOption *table, int count, int argc, char **argv,
+                         CliArgs *args) {
     const CliCommand command = {
         .name = "press",
         .usage = "--ground NAME [options]",
@@ -394,11 +394,7 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
          "draw the press; without --csv its numbers go to FILE.csv beside it"},
     };
-    CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);
-    if (outcome == CLI_BAD) {
-        return CLI_EXIT_BAD_INPUT;
-    }
-    return outcome == CLI_DONE ? -1 : 0;
+    return options_parse(table, sizeof table / sizeof *table, argc, argv, args);
 }
 
 /* Turns must alternate between down and up. */
@@ -512,9 +508,9 @@ int cmd_press(int argc, char **argv) {
                             .seconds = NAN,
                             .step = NAN};
     CliArgs args;
-    int code = options_read(argc, argv, &options, &args);
-    if (code) {
-        return code < 0 ? 0 : code;
+    const int parsed = options_read(argc, argv, &options, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     if (!options.ground) {
         return cli_fail_text("press", "--ground NAME is missing (mild info grounds lists all)");

@@ -238,18 +238,15 @@ static MildStatus prepare_and_train(Command *run, const CliArgs *args, MildError
 /* Parses on rank 0. Returns whether all go on; otherwise *code is the exit code. */
 static int parse(const CliCommand *command, int argc, char **argv, CliArgs *args, Command *run,
                  int *code) {
-    int goes_on = 0;
-    *code = 0;
+    int parsed = 0;
     if (ranks_number(run->ranks) == 0) {
-        const CliOutcome outcome = cli_parse(command, argc, argv, args);
-        goes_on = outcome == CLI_RUN && run->out;
-        if (outcome == CLI_BAD) {
-            *code = CLI_EXIT_BAD_INPUT;
-        } else if (outcome == CLI_RUN && !run->out) {
-            *code = cli_fail_text("train", "--out FOLDER is missing");
+        parsed = cli_parse(command, argc, argv, args);
+        if (parsed == CLI_RUN && !run->out) {
+            parsed = cli_fail_text("train", "--out FOLDER is missing");
         }
     }
-    return ranks_any(run->ranks, goes_on);
+    *code = parsed == CLI_RUN ? 0 : parsed;
+    return ranks_any(run->ranks, parsed == CLI_RUN);
 }
 
 int cmd_train(int argc, char **argv) {

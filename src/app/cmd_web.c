@@ -53,9 +53,9 @@ int cmd_web(int argc, char **argv) {
         .examples = "  mild web\n  mild web --port 0\n",
     };
     CliArgs args;
-    const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) {
-        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    const int parsed = cli_parse(&command, argc, argv, &args);
+    if (parsed != CLI_RUN) {
+        return parsed;
     }
     MildError error = {0};
     if (path_join(folder, "index.html", index, &error) != MILD_OK) {
