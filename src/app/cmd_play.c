@@ -70,9 +70,12 @@ static MildStatus make_scene(Command *c, MildError *error) {
             return mild_fail(error, MILD_ERROR_ARGUMENT, "--ground: the course is too long");
         }
         snprintf(name + used, sizeof name - used, "%s%s", g ? "+" : "", c->grounds.name[g]);
+    }
+    const MildStatus status = context_scene(&c->context, name, c->patch, &c->scene, error);
+    for (int g = 0; status == MILD_OK && g < c->grounds.count; g++) {
         c->names[g] = c->grounds.name[g];
     }
-    return context_scene(&c->context, name, c->patch, &c->scene, error);
+    return status;
 }
 
 /* Appends the presets that the keys of a window choose from, as many as there is room for. */

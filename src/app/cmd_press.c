@@ -331,8 +331,7 @@ static const char examples[] =
     "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
-static int options_parse(const CliOption *table, int count, int argc, char **argv,
-                         CliArgs *args) {
+static int options_parse(const CliOption *table, int count, int argc, char **argv, CliArgs *args) {
     const CliCommand command = {
         .name = "press",
         .usage = "--ground NAME [options]",

@@ -227,6 +227,7 @@ for option in "eval --track" "export --onnx"; do # others: test_inputs.sh
 done
 bad "--video" "$mild" play --video -
 bad "--pressure" "$mild" play --pressure -
+bad "12" "$mild" play --pressure x.png --ground "$(printf 'foam45,%.0s' {1..12})foam45" # more than a course may have
 
 # a controller that stands follows no command: none is shown as asked, and none is taken
 expect 0 'grass *0.00 .* - ' "$mild" eval --controller stand --ground grass --trials 1 --seconds 0.3
