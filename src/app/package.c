@@ -8,9 +8,9 @@
 
 #include "app/cli.h"
 #include "base/paths.h"
+#include "base/text.h"
 
 static const char *const commands[] = {"trial", "judge"};
-enum { COMMANDS = sizeof commands / sizeof *commands };
 
 /* Like `python -m mild`, but the working directory is no place of packages: its files could be
  * anybody's. For this `trial` is not started, whose policies may be modules there. Arguments: what
@@ -26,12 +26,7 @@ static const char code[] = "import sys\n"
                            "sys.exit(main(words))\n";
 
 int package_has(const char *command) {
-    for (int i = 0; i < COMMANDS; i++) {
-        if (strcmp(command, commands[i]) == 0) {
-            return 1;
-        }
-    }
-    return 0;
+    return text_find(command, commands, sizeof commands / sizeof *commands) >= 0;
 }
 
 void package_python(char python[PATH_SIZE]) {

@@ -154,12 +154,8 @@ static MildStatus parse_text(const MildField *field, void *def, const char *text
 
 static MildStatus parse_name(const MildField *field, void *def, const char *text,
                              const char *section, MildError *error) {
-    int count = (int)field->max + 1;
-    int index = 0;
-    while (index < count && strcmp(field->names[index], text) != 0) {
-        index++;
-    }
-    if (index == count) {
+    const int count = (int)field->max + 1, index = text_find(text, field->names, count);
+    if (index < 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'",
                          section, field->name, text, text_nearest(text, field->names, count));
     }

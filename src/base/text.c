@@ -57,6 +57,15 @@ int text_nearest_of(const char *name, const void *names, size_t stride, int coun
     return best;
 }
 
+int text_find(const char *name, const char *const *names, int count) {
+    for (int i = 0; i < count; i++) {
+        if (strcmp(name, names[i]) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
 const char *text_nearest(const char *name, const char *const *names, int count) {
     const int i = text_nearest_of(name, names, sizeof *names, count);
     return i < 0 ? NULL : names[i];

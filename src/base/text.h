@@ -12,6 +12,9 @@
  * name count. */
 const char *text_nearest(const char *name, const char *const *names, int count);
 
+/* The index of the first that is `name` itself, or -1. */
+int text_find(const char *name, const char *const *names, int count);
+
 /* The index of the nearest of names that lie `stride` bytes apart; -1: there is none. */
 int text_nearest_of(const char *name, const void *names, size_t stride, int count);
 

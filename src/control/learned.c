@@ -69,11 +69,10 @@ MildStatus ablation_find(const char *name, Ablation *ablation, MildError *error)
 #define ABLATION_NAME(name, what) #name,
     static const char *const names[ABLATIONS] = {ABLATION_LIST(ABLATION_NAME)};
 #undef ABLATION_NAME
-    for (int i = ABLATION_none + 1; i < ABLATIONS; i++) {
-        if (strcmp(name, names[i]) == 0) {
-            *ablation = (Ablation)i;
-            return MILD_OK;
-        }
+    const int found = text_find(name, names, ABLATIONS);
+    if (found > ABLATION_none) {
+        *ablation = (Ablation)found;
+        return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_ARGUMENT, "--ablate: unknown part '%.60s'; nearest is '%s'",
                      name, text_nearest(name, (const char **)names + 1, ABLATIONS - 1));

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "identify/fit_law.h"
 #include "identify/fit_solve.h"
 
@@ -36,12 +37,8 @@ typedef struct {
 
 static int give_up_place(const char *name) {
     const int count = (int)(sizeof give_up / sizeof *give_up);
-    for (int i = 0; i < count; i++) {
-        if (strcmp(give_up[i], name) == 0) {
-            return i;
-        }
-    }
-    return count;
+    const int place = text_find(name, give_up, count);
+    return place < 0 ? count : place;
 }
 
 /* Index of the parameter of a coordinate. */

@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "ground/law/models.h"
 #include "ground/sole/sole.h"
 
@@ -139,11 +140,7 @@ int fit_is_geometry(MildModel model, const char *name) {
 /* Bool: a plate that slides where slip costs support determines the parameter. */
 static int is_dragged(const char *name) {
     static const char *const names[] = {"mu", "slip_length", "regain_length", "grip"};
-    int found = 0;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        found |= strcmp(name, names[i]) == 0;
-    }
-    return found;
+    return text_find(name, names, sizeof names / sizeof *names) >= 0;
 }
 
 int fit_parameters(MildModel model, FitKind kind, const MildField *fields[FIT_PARAMETERS_MAX]) {

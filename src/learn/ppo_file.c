@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/file.h"
+#include "base/text.h"
 #include "learn/policy_file.h"
 
 enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
@@ -29,11 +30,7 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
 static int has_rows(const char *name) {
     static const char *const names[] = {"train.history", "train.critic",       "train.target",
                                         "train.frame",   "train.environments", "train.progress"};
-    int found = 0;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        found |= strcmp(name, names[i]) == 0;
-    }
-    return found;
+    return text_find(name, names, sizeof names / sizeof *names) >= 0;
 }
 
 /* Bytes of all environments from those of the part, and back. Of a process alone any number. */

@@ -593,11 +593,7 @@ static MildStatus check_gait(DefReader *reader) {
 
 static int optional(const char *key) {
     static const char *const keys[] = {"source", "legs", "shell_spacing"};
-    int found = 0;
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
-        found |= strcmp(key, keys[i]) == 0;
-    }
-    return found;
+    return text_find(key, keys, sizeof keys / sizeof *keys) >= 0;
 }
 
 static MildStatus take_robot(DefReader *reader) {

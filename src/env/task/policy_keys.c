@@ -3,6 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/text.h"
+
 static const char *const keys[] = {"gait_period",
                                    "gait_slowing",
                                    "gait_slow_below",
@@ -52,14 +54,6 @@ void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {
     }
 }
 
-static int is_policy_key(const char *name) {
-    int found = 0;
-    for (int i = 0; i < KEYS && !found; i++) {
-        found = strcmp(name, keys[i]) == 0;
-    }
-    return found;
-}
-
 /* One "key = value" of `length` characters. */
 static MildStatus take_key(TaskDef *def, const char *text, size_t length, MildError *error) {
     char line[32 + TASK_GAINS_SIZE];
@@ -75,7 +69,7 @@ static MildStatus take_key(TaskDef *def, const char *text, size_t length, MildEr
     if (equals && strcmp(line, gone) == 0) {
         return MILD_OK;
     }
-    if (!equals || !is_policy_key(line)) {
+    if (!equals || text_find(line, keys, KEYS) < 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "'%.*s' is no key that a policy of this program has",
                          (int)(length < 40 ? length : 40), text);

@@ -109,17 +109,9 @@ typedef struct {
     double before;           /* [s] time of the row before */
 } LogReader;
 
-static int find_column(char *const *cells, int count, const char *name) {
-    for (int i = 0; i < count; i++) {
-        if (strcmp(cells[i], name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
 static MildStatus read_header(LogReader *reader, MildError *error) {
     char *cells[CSV_CELLS_MAX], name[32];
+    const char *const *names = (const char *const *)cells;
     MildStatus status;
     char *line = csv_line(&reader->text, &status, error);
     const int count = line ? csv_split(line, cells) : 0;
@@ -128,7 +120,7 @@ static MildStatus read_header(LogReader *reader, MildError *error) {
     }
     for (int i = 0; i < BELIEF_FRAME; i++) {
         snprintf(name, sizeof name, "observation%d", i);
-        reader->frame[i] = find_column(cells, count, name);
+        reader->frame[i] = text_find(name, names, count);
         if (reader->frame[i] < 0) {
             return mild_fail(error, MILD_ERROR_FORMAT,
                              "%.200s: no column %s; a log has time_s and observation0 to "
@@ -136,8 +128,8 @@ static MildStatus read_header(LogReader *reader, MildError *error) {
                              reader->text.path, name, BELIEF_FRAME - 1);
         }
     }
-    reader->time = find_column(cells, count, "time_s");
-    reader->trial = find_column(cells, count, "trial");
+    reader->time = text_find("time_s", names, count);
+    reader->trial = text_find("trial", names, count);
     return reader->time >= 0
                ? MILD_OK
                : mild_fail(error, MILD_ERROR_FORMAT, "%.200s: no column time_s", reader->text.path);
