@@ -92,10 +92,9 @@ static void body_inverse_inertia(const PressBody *body, const double *R, const d
     }
 }
 
-/* Free: the centre falls, alpha = -I^-1 (omega x I omega), and the ankle's acceleration is
- * g - alpha x r - omega x (omega x r). */
 /* Fills A = J M^-1 J^T and the free twist at the ankle under gravity for foot 0 of `input`, from
- * its pose and twist. */
+ * its pose and twist. Free: the centre falls, alpha = -I^-1 (omega x I omega), and the ankle's
+ * acceleration is g - alpha x r - omega x (omega x r). */
 static void press_body_free(const PressBody *body, double gravity, MildContactInput *input) {
     const double *R = input->rotation[0], *V = input->velocity[0], *spin = V + 3;
     double r[3], moment[3], gyro[3], turn[3], swing[3], along[3], centripetal[3];
@@ -288,13 +287,20 @@ static PressRow press_row(const Press *press) {
     return row;
 }
 
+/* Also before the first step, because so many take minutes. */
+static MildStatus rows_check(double rows, MildError *error) {
+    return rows <= ROWS_MAX
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_RANGE,
+                           "press: more than %d rows; use fewer or longer steps", ROWS_MAX);
+}
+
 static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) {
+    if (rows_check(result->count + 1.0, error) != MILD_OK) {
+        return MILD_ERROR_RANGE;
+    }
     if (result->count == result->room) {
         int room = 2 * result->room + 2 * WAY_STEPS + 1;
-        if (result->count >= ROWS_MAX) {
-            return mild_fail(error, MILD_ERROR_RANGE,
-                             "press: more than %d rows; use fewer or longer steps", ROWS_MAX);
-        }
         PressRow *more = realloc(result->rows, sizeof *more * (size_t)room);
         if (!more) {
             return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory for %d rows", room);
@@ -394,8 +400,8 @@ static MildStatus hand_vertical(Press *press, double to, double force, int *reac
                                 MildError *error) {
     double from = press_depth(press), way = to - from, speed = press->def->speed,
            down = copysign(speed, way);
-    int steps = (int)fmax(ceil(fabs(way) / speed / press->def->step - 1e-6), 1);
-    MildStatus status = MILD_OK;
+    const double steps = fmax(ceil(fabs(way) / speed / press->def->step - 1e-6), 1);
+    MildStatus status = rows_check(isnan(force) ? steps : 1, error);
     *reached = 0;
     for (int i = 1; i <= steps && status == MILD_OK && !*reached; i++) {
         double next = i < steps ? from + way * i / steps : to,
@@ -511,11 +517,11 @@ static MildStatus drop_step(Press *press, const PressBody *body, MildError *erro
 static MildStatus drop_run(Press *press, MildError *error) {
     const PressDef *def = press->def;
     PressBody body = press_body(press->sole, def->mass);
-    int steps = (int)ceil(def->seconds / def->step - 1e-6);
+    const double steps = ceil(def->seconds / def->step - 1e-6);
     press->input.dt = def->step;
     press->input.velocity[0][2] = -def->impact;
     press_place(press, press->start - def->height);
-    MildStatus status = MILD_OK;
+    MildStatus status = rows_check(steps, error);
     for (int i = 0; i < steps && status == MILD_OK; i++) {
         status = drop_step(press, &body, error);
     }

@@ -39,6 +39,8 @@ bad "ground.model" "$mild" press --ground sand_loose --model rigid
 bad "--model con_cone --ground.model=mild" "$mild" press --ground sand_loose --model con_cone --ground.model=mild
 bad "ecc_sprin ecc_spring" "$mild" eval --ground sand_loose --ground.model=ecc_sprin
 bad "--mass" "$mild" press --ground sand_loose --mass 5
+bad "2500000 steps" "$mild" press --ground foam45 --depth 1 --speed 1e-5 --step 1e-7 # more than an int can count
+bad "2500000 steps" timeout 60 "$mild" press --ground foam45 --drop 0 --seconds 100 --step 1e-7
 bad "--drop --depth" "$mild" press --ground sand_loose --drop 0.1 --depth 0.02
 bad "--force 50 100" "$mild" press --ground sand_loose --force 200,100,50
 bad "--drag --cycles" "$mild" press --ground sand_loose --drag 0.1 --cycles 2

@@ -34,7 +34,6 @@ void train_destroy(Trainer *trainer) {
     free(trainer);
 }
 
-/* The networks of a policy file take the place of the random ones. */
 /* Bool: the points of the ground that `other` sees, if it does, are those of `own`, whose scan has
  * as many. */
 static int sees_the_same(const TaskDef *own, const PolicyDef *other) {
@@ -44,6 +43,7 @@ static int sees_the_same(const TaskDef *own, const PolicyDef *other) {
                                 theirs.scan_ahead[0] == own->scan_ahead[0]);
 }
 
+/* The networks of a policy file take the place of the random ones. */
 static MildStatus start_policy(Trainer *trainer, MildError *error) {
     const char *path = trainer->def.train.start;
     MildError cause = {0};
