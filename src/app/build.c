@@ -23,7 +23,7 @@ const char *build_type(void) {
     return MILD_BUILD_TYPE;
 }
 
-int build_cores(void) {
+static int cores_of_machine(void) {
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     return cores > 0 ? (int)cores : 1;
 }
@@ -46,7 +46,7 @@ const char *build_machine(char *text, size_t size) {
     if (file) {
         fclose(file);
     }
-    int cores = build_cores();
+    const int cores = cores_of_machine();
     snprintf(text, size, "%s, %d core%s", name, cores, cores == 1 ? "" : "s");
     return text;
 }

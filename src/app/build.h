@@ -11,7 +11,6 @@ const char *build_type(void);
 
 /* Processor and core count, e.g. "AMD EPYC 9B45, 2 cores"; returns `text`. */
 const char *build_machine(char *text, size_t size);
-int build_cores(void);
 double build_memory_bytes(void); /* of the machine; 0 when unknown */
 
 #endif

@@ -9,8 +9,6 @@
 #include "base/paths.h"
 #include "identify/belief/file.h"
 
-#define PERIOD 0.01 /* [s] of a frame */
-
 /* The ground that the posterior is of, from the last alarm on. */
 static void print_table(const Belief *belief, const BeliefNet *net) {
     printf("%-12s %10s %10s %10s  %s\n", "parameter", "median", "low 90 %", "high 90 %", "unit");
@@ -58,10 +56,10 @@ static cJSON *walk_log(const BeliefLog *log, const BeliefNet *net, Belief *belie
     for (int i = 0; i < log->count; i++) {
         const int event = belief_step(belief, net, log->frame[i]);
         if (event & BELIEF_ALARM && !quiet) {
-            printf("%.2f s: other ground\n", i * PERIOD);
+            printf("%.2f s: other ground\n", i * BELIEF_PERIOD);
         }
         if (event & BELIEF_FOOTSTEP) {
-            cJSON_AddItemToArray(footsteps, footstep_json(belief, i * PERIOD, event));
+            cJSON_AddItemToArray(footsteps, footstep_json(belief, i * BELIEF_PERIOD, event));
         }
     }
     return footsteps;

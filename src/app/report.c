@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
+#include "app/package.h"
 #include "base/file.h"
 #include "base/paths.h"
 
@@ -41,7 +41,7 @@ MildStatus figure_draw(const char *kind, const char *data, const char *picture, 
                        MildError *error) {
     char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256],
         what[32];
-    path_data(".venv/bin/python", python);
+    package_python(python);
     path_data("scripts/draw.py", code_path);
     FILE *text = file_open(code_path, error); /* as an input, it cannot be the output, too */
     if (!text) {
@@ -52,10 +52,6 @@ MildStatus figure_draw(const char *kind, const char *data, const char *picture, 
     snprintf(from, sizeof from, "%s", data);
     snprintf(to, sizeof to, "%s", picture);
     snprintf(above, sizeof above, "%s", title ? title : "");
-    if (access(python, X_OK) != 0) {
-        const char *caller = getenv("MILD_PYTHON"); /* of python -m mild */
-        snprintf(python, sizeof python, "%s", caller && *caller ? caller : "python3");
-    }
     char *arguments[] = {python, code_path, what, from, to, title ? above : NULL, NULL};
     pid_t child;
     int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);

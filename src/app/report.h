@@ -15,8 +15,8 @@ MildStatus report_save(cJSON *root, const char *path, MildError *error);
 
 /* ---- a Python script draws the figures from CSV files that the program writes ---- */
 
-/* Runs scripts/draw.py with the arguments `kind` ("fit"), `data`, `picture` and, unless it is NULL,
- * `title`. Uses the Python of .venv, or else the system's. */
+/* Runs scripts/draw.py by package_python, with the arguments `kind` ("fit"), `data`, `picture` and,
+ * unless it is NULL, `title`. */
 MildStatus figure_draw(const char *kind, const char *data, const char *picture, const char *title,
                        MildError *error);
 

@@ -296,36 +296,6 @@ static void shear_forces(const FitPlate *plate, const MildMaterial *raw, const F
     }
 }
 
-/* Bool: a row belongs with the one before it. */
-static int is_next(FitKind kind, const FitPoint *row) {
-    if (kind == FIT_DRAG) {
-        return fit_drag_is_next(row);
-    }
-    return row->plate == row[-1].plate && (kind != FIT_UNLOAD || row->depth < row[-1].depth);
-}
-
-void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
-                const FitPoint *points, int count, double *force) {
-    MildMaterial raw = *material;
-    raw.passive = 0;
-    raw.plate_width = 0;
-    for (int first = 0, end; first < count; first = end) {
-        const FitPlate *plate = &plates[points[first].plate];
-        for (end = first + 1; end < count && is_next(kind, &points[end]); end++) {
-            continue;
-        }
-        if (kind == FIT_UNLOAD) {
-            unload_forces(&raw, points + first, end - first, force + first);
-        } else if (kind == FIT_SHEAR) {
-            shear_forces(plate, &raw, points + first, end - first, force + first);
-        } else if (kind == FIT_DRAG) {
-            fit_drag_forces(plate, &raw, points + first, end - first, force + first);
-        } else {
-            plate_forces(plate, &raw, points + first, end - first, force + first);
-        }
-    }
-}
-
 #define STRIDE 2e-4 /* [m] slip in a step of the path */
 #define STRIDES_MAX 100
 
@@ -391,8 +361,9 @@ static int shares_find(const Share *law, const MildMaterial *material, const Fit
     return ups;
 }
 
-void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
-                     int count, double *force) {
+/* The same of rows that slide, of one record. */
+static void drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
+                        int count, double *force) {
     const double width = plate->sole ? mild_sole_width(plate->sole) : 0;
     const Share law = share_of(material, plate->pitch, width);
     const int ups = shares_find(&law, material, points, count, force);
@@ -408,6 +379,36 @@ void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const 
     }
     for (int i = 0; i < ups; i++) {
         force[i] *= square > 0 ? along / square : 0;
+    }
+}
+
+/* Bool: a row belongs with the one before it. */
+static int is_next(FitKind kind, const FitPoint *row) {
+    if (kind == FIT_DRAG) {
+        return fit_drag_is_next(row);
+    }
+    return row->plate == row[-1].plate && (kind != FIT_UNLOAD || row->depth < row[-1].depth);
+}
+
+void fit_forces(FitKind kind, const FitPlate *plates, const MildMaterial *material,
+                const FitPoint *points, int count, double *force) {
+    MildMaterial raw = *material;
+    raw.passive = 0;
+    raw.plate_width = 0;
+    for (int first = 0, end; first < count; first = end) {
+        const FitPlate *plate = &plates[points[first].plate];
+        for (end = first + 1; end < count && is_next(kind, &points[end]); end++) {
+            continue;
+        }
+        if (kind == FIT_UNLOAD) {
+            unload_forces(&raw, points + first, end - first, force + first);
+        } else if (kind == FIT_SHEAR) {
+            shear_forces(plate, &raw, points + first, end - first, force + first);
+        } else if (kind == FIT_DRAG) {
+            drag_forces(plate, &raw, points + first, end - first, force + first);
+        } else {
+            plate_forces(plate, &raw, points + first, end - first, force + first);
+        }
     }
 }
 

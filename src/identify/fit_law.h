@@ -86,9 +86,6 @@ int fit_drag_is_modelled(MildModel model);
 
 /* Bool: a row is of the same record as the one before it. */
 int fit_drag_is_next(const FitPoint *row);
-/* What the rows of one record should have. */
-void fit_drag_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
-                     int count, double *force);
 
 /* ---- the rows of a fit of such a plate, from those of its record ---- */
 

@@ -88,7 +88,8 @@ static void hide(mjSpec *spec, mjSpec *look) {
     }
 }
 
-MildStatus look_add(mjSpec *spec, const char *path, MildError *error) {
+/* Adds the meshes of `path` to the bodies of the same names and hides the other geoms of these. */
+static MildStatus look_add(mjSpec *spec, const char *path, MildError *error) {
     RobotFiles files;
     mjSpec *look = robot_files_parse(&files, path, error);
     MildStatus status = look ? MILD_OK : error->status;

@@ -17,9 +17,6 @@
 /* The path of look.xml beside the robot's file `xml`, or NULL where there is none. */
 const char *look_path(const char *xml, char path[PATH_SIZE]);
 
-/* Adds the meshes of `path` to the bodies of the same names and hides the other geoms of these. */
-MildStatus look_add(mjSpec *spec, const char *path, MildError *error);
-
 #define VIEW_COARSE 4 /* [vertices] spacing of drawn vertices on a tile without imprints */
 
 /* Surfaces that view.c lends to tiles. */

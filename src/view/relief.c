@@ -428,7 +428,7 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
            rows = ceil((def->y_max - def->y_min) / edge);
     if (!(def->cell > 0) || !(columns >= 1 && columns * rows <= 20000 && rows >= 1)) {
         mild_fail(error, MILD_ERROR_RANGE,
-                  "ground picture: area %g x %g m at %g m is empty or too large",
+                  "ground picture: %g x %g m at %g m is empty or too large: walk a shorter way",
                   def->x_max - def->x_min, def->y_max - def->y_min, def->cell);
         return NULL;
     }

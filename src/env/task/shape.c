@@ -8,7 +8,6 @@ const char *const task_end_names[] = {TASK_ENDS(TASK_END_NAME)};
 /* Numbers of TASK_FRAME_LIST that the task has. */
 static int frame_last(const TaskDef *def) {
     int count = 0;
-    (void)def;
 #define FRAME_COUNT(name, has, value, sign) count += (has) ? 1 : 0;
     TASK_FRAME_LIST(FRAME_COUNT)
     return count;
@@ -39,7 +38,6 @@ TaskMirror task_mirror(const TaskDef *def, const Robot *robot) {
     TaskMirror mirror = {.observation_index = {0}};
     const int joints = robot_joints(robot), actions = robot_actions(robot);
     int at = 9 + 2 * joints + actions;
-    (void)def;
     for (int i = 0; i < 9; i++) {
         mirror.observation_index[i] = i;
         mirror.observation_sign[i] = head[i];

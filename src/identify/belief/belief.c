@@ -65,7 +65,8 @@ static void add_frame(Belief *belief, const float *frame, int bin) {
     belief->frames++;
 }
 
-int belief_features(const Belief *belief, double *features) {
+/* The features of the footstep that the next frame ends; 0: it is none that counts. */
+static int footstep_features(const Belief *belief, double *features) {
     const double frames = belief->frames;
     if (frames < FOOTSTEP_MIN || frames > FOOTSTEP_MAX) {
         return 0;
@@ -222,7 +223,7 @@ static float mean_of_all(const Belief *belief, float *mean) {
 static int take_footstep(Belief *belief, const BeliefNet *net) {
     double features[BELIEF_FEATURES];
     float embedded[BELIEF_EMBED], mean[BELIEF_EMBED];
-    if (!belief->whole || !belief_features(belief, features)) {
+    if (!belief->whole || !footstep_features(belief, features)) {
         return 0;
     }
     if (belief->waiting > 0) {

@@ -36,6 +36,7 @@ typedef struct {
 } BeliefName;
 extern const BeliefName belief_names[BELIEF_PARAMETERS];
 
+#define BELIEF_PERIOD 0.01 /* [s] from frame to frame */
 enum {
     BELIEF_FRAME = 47,    /* of a robot of 12 joints: docs/policy.md section 3 */
     BELIEF_BINS = 8,      /* of a footstep */
@@ -115,10 +116,5 @@ double belief_place(const BeliefNet *net, BeliefParameter parameter, double valu
 void belief_text(const Belief *belief, const BeliefNet *net, char *text, int size);
 /* The same with a line for each. */
 void belief_lines(const Belief *belief, const BeliefNet *net, char *text, int size);
-
-/* ---- for tests and training ---- */
-
-/* The features of the footstep that the next frame ends; 0: it is none that counts. */
-int belief_features(const Belief *belief, double *features);
 
 #endif

@@ -98,7 +98,6 @@ MildStatus belief_open(const char *robot, BeliefNet **net, MildError *error) {
 }
 
 enum { ROWS_MAX = 1000000 };
-#define PERIOD 0.01     /* [s] of the policy */
 #define FRAME_LIMIT 1e3 /* no reading is larger */
 
 typedef struct {
@@ -160,12 +159,13 @@ static MildStatus read_row(LogReader *reader, char *line, float *frame, int *tak
         return status;
     }
     status = read_number(reader, cells, count, reader->time, &time, error);
-    if (status == MILD_OK && fabs(time - reader->before - PERIOD) > 0.5 * PERIOD &&
+    if (status == MILD_OK && fabs(time - reader->before - BELIEF_PERIOD) > 0.5 * BELIEF_PERIOD &&
         isfinite(reader->before)) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: time_s %g does not come %g s after %g; a log has a row for "
                          "each policy step, 100 a second",
-                         reader->text.path, reader->text.number, time, PERIOD, reader->before);
+                         reader->text.path, reader->text.number, time, BELIEF_PERIOD,
+                         reader->before);
     }
     for (int i = 0; i < BELIEF_FRAME && status == MILD_OK; i++) {
         status = read_number(reader, cells, count, reader->frame[i], &value, error);
