@@ -681,8 +681,6 @@ Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
     return b ? &b->base : NULL;
 }
 
-/* ---- tests ---- */
-
 int envs_are_slow(const Robot *robot) {
     double *number = calloc(ENGINE_NUMBERS, sizeof *number);
     EngineTree tree;

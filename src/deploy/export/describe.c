@@ -60,7 +60,6 @@ static void add_frame(Description *d, const TaskDef *def, const Robot *robot) {
     const int has[] = {TASK_FRAME_LIST(FRAME_HAS)};
     char names[DESCRIBE_VALUE] = "", widths[DESCRIBE_VALUE] = "";
     int width = 0;
-    (void)def;
     for (size_t i = 0; i < sizeof has / sizeof *has; i++) {
         width += has[i] != 0;
         if (width > 0 && strcmp(name[i], name[i + 1]) != 0) {

@@ -1,11 +1,10 @@
+#include "env/task/task_def.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "env/task/task_def.h"
-
 #include "env/task/scan.h"
-
 #include "robot/float/float_ground.h"
 #include "robot/robot.h"
 
@@ -551,10 +550,6 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
                          def->physics_dt);
-    }
-    if (status == MILD_OK && def->jump[0] > def->jump[1]) {
-        return mild_fail(error, MILD_ERROR_RANGE, "task.jump: %g is above %g", def->jump[0],
-                         def->jump[1]);
     }
     status = status == MILD_OK ? check_scan(def, error) : status;
     if (status == MILD_OK && def->contact_float &&
