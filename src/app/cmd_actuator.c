@@ -178,28 +178,19 @@ typedef struct {
 
 static MildStatus write_log(LogCommand *c, MildError *error) {
     Context *on = &c->context;
-    char *text = NULL;
-    size_t size = 0;
+    Sheet csv = {0};
     int falls;
     motor_init(&c->made_up, &c->motor, on->robot, on->task.physics_dt);
     c->log.task = &on->task, c->log.robot = on->robot, c->log.controller = &on->mover;
     c->log.motors = &c->made_up.motors;
-    c->log.csv = open_memstream(&text, &size);
-    if (!c->log.csv) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-    }
-    MildStatus status = motor_log(&c->log, &falls, error);
-    if (fclose(c->log.csv) && status == MILD_OK) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", c->out);
-    }
-    if (status == MILD_OK) {
-        status = report_text(text, size, c->out, error);
-    }
+    MildStatus status = sheet_open(&csv, error);
+    c->log.csv = csv.file;
+    status = status == MILD_OK ? motor_log(&c->log, &falls, error) : status;
+    status = sheet_close(&csv, c->out, status, error);
     if (status == MILD_OK) {
         fprintf(strcmp(c->out, "-") == 0 ? stderr : stdout, "%.0f s, %d falls, written: %s\n",
                 c->log.seconds, falls, c->out);
     }
-    free(text);
     return status;
 }
 

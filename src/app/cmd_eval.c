@@ -149,32 +149,13 @@ static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *sce
     return context_scene(&e->context, name, speed < 0 ? -e->patch : e->patch, scene, error);
 }
 
-/* A CSV in memory, so that its file is written whole or not at all. */
-typedef struct {
-    FILE *file;
-    char *text;
-    size_t size;
-} Sheet;
-
-static MildStatus sheet_open(Sheet *sheet, MildError *error) {
-    sheet->file = open_memstream(&sheet->text, &sheet->size);
-    return sheet->file ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-}
-
-/* Writes it to `path` if all went well so far, and says its size, because a row for each physics
- * step is many. A sheet that was not opened is left. */
-static MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status, MildError *error) {
+/* sheet_close; says the size, because a row for each physics step is many. */
+static MildStatus close_csv(Sheet *sheet, const char *path, MildStatus status, MildError *error) {
     char size[32];
-    if (sheet->file && fclose(sheet->file) && status == MILD_OK) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+    status = sheet_close(sheet, path, status, error);
+    if (sheet->file && status == MILD_OK && strcmp(path, "-") != 0) {
+        fprintf(stderr, "%s: %s\n", path, text_bytes((double)sheet->size, size, sizeof size));
     }
-    if (sheet->file && status == MILD_OK) {
-        status = report_text(sheet->text, sheet->size, path, error);
-        if (status == MILD_OK && strcmp(path, "-") != 0) {
-            fprintf(stderr, "%s: %s\n", path, text_bytes((double)sheet->size, size, sizeof size));
-        }
-    }
-    free(sheet->text);
     return status;
 }
 
@@ -291,7 +272,7 @@ static MildStatus evaluate_inside(Eval *e, FILE *table, MildError *error) {
         status = evaluate_rows(e, table, error);
     }
     e->eval.callback = NULL;
-    return sheet_close(&sheet, e->latent, status, error);
+    return close_csv(&sheet, e->latent, status, error);
 }
 
 /* All at once, by the batch engine: its rows have one map, because each has one material. */
@@ -371,10 +352,10 @@ static MildStatus evaluate(Eval *e, MildError *error) {
         status = evaluate_table(e, error);
     }
     e->eval.stances = e->eval.actions = e->eval.track = e->eval.feet = NULL;
-    status = sheet_close(&stances, e->stances, status, error);
-    status = sheet_close(&actions, e->actions, status, error);
-    status = sheet_close(&track, e->track, status, error);
-    return sheet_close(&feet, e->feet, status, error);
+    status = close_csv(&stances, e->stances, status, error);
+    status = close_csv(&actions, e->actions, status, error);
+    status = close_csv(&track, e->track, status, error);
+    return close_csv(&feet, e->feet, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an

@@ -11,7 +11,7 @@
 #include "app/fit_work.h"
 #include "app/grounds.h"
 #include "app/report.h"
-#include "base/file.h"
+#include "base/paths.h"
 #include "base/text.h"
 #include "ground/law/models.h"
 #include "ground/soil/soil.h"
@@ -543,15 +543,6 @@ static MildStatus sets_fit(const FitOptions *options, FitWork *work, MildError *
 
 /* ---- the picture ---- */
 
-static MildStatus data_write(const FitWork *work, const char *path, MildError *error) {
-    size_t size = 0;
-    char *text = fit_numbers(work, &size);
-    MildStatus status = text ? file_write(path, text, size, error)
-                             : mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
-    free(text);
-    return status;
-}
-
 static MildStatus figure_save(const FitWork *work, const char *figure, MildError *error) {
     char data[PATH_SIZE];
     if (!work->set[FIT_PRESS].done) {
@@ -560,7 +551,7 @@ static MildStatus figure_save(const FitWork *work, const char *figure, MildError
     }
     MildStatus status = path_beside(figure, NUMBERS_END, data, error);
     if (status == MILD_OK) {
-        status = data_write(work, data, error);
+        status = fit_numbers_save(work, data, error);
     }
     if (status == MILD_OK) {
         status = figure_draw("fit", data, figure, NULL, error);

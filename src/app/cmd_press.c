@@ -1,6 +1,5 @@
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "app/cli.h"
@@ -114,38 +113,26 @@ static MildStatus tool_set_model(Tool *tool, int model, const CliArgs *args, Mil
 }
 
 /* Eight columns; four more where the motion is not straight down and up. */
-static char *csv_text(const PressResult *result, int more, size_t *size) {
-    char *text = NULL;
-    FILE *memory = open_memstream(&text, size);
-    if (!memory) {
-        return NULL;
+static MildStatus csv_write(const PressResult *result, int more, const char *path,
+                            MildError *error) {
+    Sheet csv = {0};
+    MildStatus status = sheet_open(&csv, error);
+    if (status != MILD_OK) {
+        return status;
     }
-    fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,area_m2%s\n",
+    fprintf(csv.file, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,area_m2%s\n",
             more ? ",force_x_n,force_y_n,x_m,tilt_rad" : "");
     for (int i = 0; i < result->count; i++) {
         const PressRow *row = &result->rows[i];
-        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth,
+        fprintf(csv.file, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth,
                 row->force, row->moment_x, row->moment_y, row->zmp_x, row->zmp_y, result->area);
         if (more) {
-            fprintf(memory, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x, row->tilt);
+            fprintf(csv.file, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x,
+                    row->tilt);
         }
-        fputc('\n', memory);
+        fputc('\n', csv.file);
     }
-    if (fclose(memory) == 0) {
-        return text;
-    }
-    free(text);
-    return NULL;
-}
-
-static MildStatus csv_write(const PressResult *result, int more, const char *path,
-                            MildError *error) {
-    size_t size = 0;
-    char *text = csv_text(result, more, &size);
-    MildStatus status = text ? report_text(text, size, path, error)
-                             : mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
-    free(text);
-    return status;
+    return sheet_close(&csv, path, MILD_OK, error);
 }
 
 /* Draws the picture from the file of --csv, or otherwise from FILE.csv beside FILE.png. */

@@ -1,7 +1,6 @@
 /* What `mild fit` prints and writes of its results. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "app/fit_work.h"
@@ -351,26 +350,23 @@ MildStatus fit_json_save(const FitWork *work, const char *path, MildError *error
 
 /* ---- the numbers of the picture ---- */
 
-char *fit_numbers(const FitWork *work, size_t *size) {
+MildStatus fit_numbers_save(const FitWork *work, const char *path, MildError *error) {
     const FitSet *press = &work->set[FIT_PRESS];
-    char *text = NULL;
-    FILE *memory = open_memstream(&text, size);
-    if (!memory) {
-        return NULL;
-    }
-    fprintf(memory, "record,depth_m,force_n,speed_m_s,fit_n\n");
     const FitPoint *p = press->points;
+    Sheet csv = {0};
+    MildStatus status = sheet_open(&csv, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    fprintf(csv.file, "record,depth_m,force_n,speed_m_s,fit_n\n");
     for (int f = 0; f < work->files; f++) {
         const int rows = work->file[f].kind == FIT_FILE_PRESS ? work->file[f].count : 0;
         for (const FitPoint *end = p + rows; p < end; p++) {
             double force;
             fit_forces(FIT_PRESS, press->def.plate, &press->result.curve, p, 1, &force);
-            fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed, force);
+            fprintf(csv.file, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed,
+                    force);
         }
     }
-    if (fclose(memory) != 0) {
-        free(text);
-        return NULL;
-    }
-    return text;
+    return sheet_close(&csv, path, MILD_OK, error);
 }

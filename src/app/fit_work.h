@@ -35,8 +35,8 @@ typedef struct {
 /* The table, and what it rests on, to standard output. */
 void fit_print(const FitWork *work);
 MildStatus fit_json_save(const FitWork *work, const char *path, MildError *error);
-/* The numbers of the picture of presses. To be freed; NULL when out of memory. */
-char *fit_numbers(const FitWork *work, size_t *size);
+/* The numbers of the picture of presses. */
+MildStatus fit_numbers_save(const FitWork *work, const char *path, MildError *error);
 /* "residual 3.1 N, 0.6 % of the force ...", a line for each kind that was fitted. */
 const char *fit_residual_text(const FitWork *work, FitKind kind, char *text, size_t size);
 

@@ -20,6 +20,22 @@ MildStatus report_text(const char *text, size_t size, const char *path, MildErro
                : MILD_OK;
 }
 
+MildStatus sheet_open(Sheet *sheet, MildError *error) {
+    sheet->file = open_memstream(&sheet->text, &sheet->size);
+    return sheet->file ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+}
+
+MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status, MildError *error) {
+    if (sheet->file && fclose(sheet->file) && status == MILD_OK) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+    }
+    if (sheet->file && status == MILD_OK) {
+        status = report_text(sheet->text, sheet->size, path, error);
+    }
+    free(sheet->text);
+    return status;
+}
+
 MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     char *text = root ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
