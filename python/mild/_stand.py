@@ -192,6 +192,8 @@ def stand(model, description, ground, attributes, painted=False):
     colour, and soft ground is dented."""
     d = description
     spec, remark = _world(model, d, ground, painted)
+    if spec.compiler.fusestatic:
+        spec.compile()  # fuses, so that bodies and shapes of the spec are numbered as the model's
     bare = spec.copy().compile()
     names = joint_names(bare)
     if d.policy["model_joints"] not in (0, len(names)):

@@ -235,6 +235,15 @@ class Standing(unittest.TestCase):
         robot = self.stand(text)
         self.assertEqual((robot.feet.names, robot.feet.bodies), (["left_foot", "right_foot"], ["left_leg", "right_leg"]))
 
+    def test_fused(self):
+        """Where fusestatic moves the shapes of a head and a tail to the trunk, and so all numbers, soles are those of the feet."""
+        part = '<body name="{}"><geom size="0.05" pos="0 0 0.2"/><geom size="0.05" pos="0 0 0.3"/></body>'.format
+        text = biped().replace('<compiler ', '<compiler fusestatic="true" ').replace('<body name="left_leg"', part("head") + '<body name="left_leg"')
+        robot = self.stand(text.replace("</body></worldbody>", part("tail") + "</body></worldbody>"))
+        self.assertEqual(robot.model.nbody, 6)
+        self.assertEqual((robot.feet.names, robot.feet.bodies), (["left_foot", "right_foot"], ["left_leg", "right_leg"]))
+        self.assertEqual([robot.model.body(robot.model.geom_bodyid[geom]).name for geom in robot.soles], robot.feet.names)
+
     def test_turned(self):
         """A foot whose body's axes lie gets a site whose z axis points up from the sole, also where the sole is not level at the start."""
         for euler, pose in (("1.5707963 0 0", 0), ("0 1.5707963 0", 0), ("0 0.2 0", -0.2), ("0 0 0", 0.05)):
