@@ -209,7 +209,8 @@ def stand(model, description, ground, attributes, painted=False):
                                 ("lower", -np.inf), ("upper", np.inf))}
     scale = by_joint(d.scale, names, 1.0, "scale", numbers)[order[:count]]
     if ground == "rigid" and not any(bare.geom_contype[geom] or bare.geom_conaffinity[geom] or bare.npair for geom in solids(bare)):
-        raise ValueError("model: no shape of the robot collides, so that it would fall through the rigid floor")
+        raise ValueError("model: no shape of the robot collides (contype, conaffinity), so that it would fall through the rigid floor; "
+                         "take its maker's MJCF, or `mild eval --robot` for a robot of mild")
     start = _start(bare, d, names, tables["default"])
     if d.start["keyframe"] and not d.default:  # its angles are the default ones
         tables["default"] = np.array([start[bare.joint(name).qposadr[0]] for name in names])

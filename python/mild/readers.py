@@ -36,6 +36,8 @@ def find(policy):
         return path
     if beside:
         return beside[0]
+    if path.suffix.lower() == ".safetensors":
+        raise ValueError(f"policy: '{policy}' may be one of mild's own; `mild eval --policy {policy}` lets it walk")
     if path.suffix.lower() in (".onnx", ".pt") and not path.is_file():
         raise ValueError(f"policy: there is no file '{policy}'")
     raise ValueError(f"describe: '{path}' has no metadata of mjlab or holosoma, and no {' or '.join(BESIDE)} is beside it; needs --describe "

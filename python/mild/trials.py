@@ -491,7 +491,10 @@ class Film:
 
 # ---- the command ----
 def _list(read):
-    return lambda text: [read(word) for word in text.split(",") if word]
+    def values(text):
+        return [read(word) for word in text.split(",") if word]
+    values.__name__ = f"{read.__name__} list"  # argparse calls it so: invalid float list value
+    return values
 
 
 EXAMPLES = """examples:
@@ -595,6 +598,10 @@ def main(argv=None):
         if arguments.video:
             os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it once, when it is imported
         _quietly()
+        for option in ("json", "csv", "plot", "video"):  # before an hour of walks
+            file = pathlib.Path(getattr(arguments, option) or "-")
+            if str(file) != "-" and (file.is_dir() or not file.absolute().parent.is_dir()):
+                raise ValueError(f"{option}: " + (f"'{file}' is a folder" if file.is_dir() else f"there is no folder '{file.parent}'"))
         if arguments.sweep:
             from . import sweep
 
@@ -604,6 +611,8 @@ def main(argv=None):
 
             sweep.run(arguments, changes, attributes)
             return 0
+        if arguments.range or arguments.csv or arguments.plot:
+            raise ValueError("range, csv, plot: are of a sweep; name one with --sweep")
         out = sys.stderr if arguments.json == "-" else sys.stdout
         table = trial(arguments.model, arguments.policy, arguments.describe, ground=arguments.ground, speeds=arguments.speed,
                       sideways=arguments.sideways, turn=arguments.turn, trials=10 if arguments.trials is None else arguments.trials, seconds=arguments.seconds, seed=arguments.seed,

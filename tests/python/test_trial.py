@@ -712,6 +712,7 @@ class Command(unittest.TestCase):
             folder = pathlib.Path(folder)
             (folder / "robot.xml").write_text(biped())
             (folder / "bad.xml").write_text("<mujoco>\n<worldbody>\n<bodies/></worldbody></mujoco>")
+            (folder / "bare.xml").write_text(biped().replace("<geom ", '<geom contype="0" conaffinity="0" ').replace('contype="0" conaffinity="0" mass="0"', 'mass="0"'))
             (folder / "mine.py").write_text("import numpy as np\ndef still(o):\n    return np.zeros(4)\n")
             (folder / "mine.ini").write_text("[policy]\ndecimation = 5\n[observation]\ngravity = 1\n[kp]\n.* = 400\n[kd]\n.* = 8\n")
             model, policy, describe = folder / "robot.xml", f"{folder}/mine.py:still", ("--describe", folder / "mine.ini")
@@ -735,12 +736,18 @@ class Command(unittest.TestCase):
                                     ((model, policy, *describe, "--trials", 0), "more than 0"), ((model, policy, *describe, "--tour", "--turn", "1"), "steers"),
                                     ((model, policy, *describe, "--tour", "--sweep", "friction"), "one of the two"), ((model, policy, *describe, "--set", "command.forward=1 2"), "0 between"),
                                     ((model, policy, *describe, "--set", "command.turn=nan"), "0 or more"), ((model, policy, *describe, "--set", "command.sideways=-1"), "0 or more"),
-                                    ((model, policy, *describe, "--ground", "soup"), "soup"),
+                                    ((model, policy, *describe, "--ground", "soup"), "soup"), ((model, policy, *describe, "--csv", folder / "a.csv"), "--sweep"),
+                                    ((model, policy, *describe, *short, "--json", folder / "none/a.json"), "json: there is no folder"),
+                                    ((model, policy, *describe, *short, "--json", folder), "is a folder"), ((model, folder / "a.safetensors"), "mild eval --policy"),
+                                    ((folder / "bare.xml", policy, *describe, *short), "mild eval --robot"),
                                     ((folder / "no.xml", policy, *describe), "no file"), ((folder / "bad.xml", policy, *describe), "bodies"),
                                     ((model, policy, *describe, "--set", "observation.sensor:ear=1"), "sensor:ear: the model has no such"), ((model, "no.onnx", *describe), "no file")):
                 status, _, error = self.run_main(*arguments)
                 self.assertEqual((status, error.count("\n"), error.startswith("mild trial: ")), (2, 1, True), error)
                 self.assertIn(line, error)
+            with self.assertRaises(SystemExit), contextlib.redirect_stderr(io.StringIO()) as told:
+                trials.main(["--speed", "fast"])
+            self.assertIn("--speed: invalid float list value: 'fast'", told.getvalue())
 
     def test_module(self):
         """`python -m mild trial` warns of nothing, and mild.trial is a function."""
