@@ -51,14 +51,11 @@ static void make(Batch *at, int robots, const nb::sequence &soles, double dt, do
 }
 
 /* material: of robots that stand. */
-static void set_materials(Batch &batch, const nb::sequence &materials, nb::handle material) {
+static void set_materials(Batch &batch, nb::handle materials, nb::handle material) {
     Entered entered(batch.busy, "Batch.set_materials");
     MildBatch *at = open_batch(batch);
-    std::vector<MildMaterial> list;
+    const std::vector<MildMaterial> list = materials_of(materials);
     MildError error = {};
-    for (nb::handle one : materials) {
-        list.push_back(material_of(one, "materials"));
-    }
     if (list.empty()) {
         raise(PyExc_ValueError, "materials: at least one is needed");
     }

@@ -48,6 +48,8 @@ void set_fields(const MildField *fields, int count, void *def, const nb::kwargs 
                 const char *kind);
 /* The map of a Map; NULL for None. */
 const MildMap *map_of(nb::handle object);
+/* Those of a Material or a name, or of a list of these; any number. */
+std::vector<MildMaterial> materials_of(nb::handle object);
 /* A terrain or the material of a uniform one. */
 Terrain terrain_of(nb::handle object);
 /* Soles of a tuple, which keeps them. */

@@ -301,7 +301,7 @@ static double finite(double value, const char *name) {
     return value;
 }
 
-static std::vector<MildMaterial> materials_of(nb::handle object) {
+std::vector<MildMaterial> materials_of(nb::handle object) {
     std::vector<MildMaterial> list;
     if (nb::isinstance<Material>(object) || nb::isinstance<nb::str>(object)) {
         list.push_back(material_of(object, "materials"));
@@ -313,6 +313,11 @@ static std::vector<MildMaterial> materials_of(nb::handle object) {
     for (nb::handle one : nb::borrow<nb::sequence>(object)) {
         list.push_back(material_of(one, "materials"));
     }
+    return list;
+}
+
+static std::vector<MildMaterial> materials_of_terrain(nb::handle object) {
+    std::vector<MildMaterial> list = materials_of(object);
     if (list.empty() || list.size() > MILD_MATERIALS_MAX) {
         raise(PyExc_ValueError, "materials: " + std::to_string(list.size()) +
                                     " of them, but a terrain has 1 .. " +
@@ -333,7 +338,7 @@ static void set_map(Terrain &terrain, nb::object map) {
 
 static Terrain make_terrain(nb::handle materials, nb::object map, double height, double x,
                             double y) {
-    const std::vector<MildMaterial> list = materials_of(materials);
+    const std::vector<MildMaterial> list = materials_of_terrain(materials);
     Terrain terrain = {mild_terrain_uniform(&list[0]), nb::none()};
     MildTerrain &at = terrain.terrain;
     at.material_count = (int)list.size();

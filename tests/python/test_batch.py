@@ -146,6 +146,9 @@ class Batch(unittest.TestCase):
             self.batch.set_materials([])
         with self.assertRaisesRegex(ValueError, "mud"):
             self.batch.set_materials(["mud"])
+        with self.assertRaisesRegex(TypeError, "materials: they must be"):
+            self.batch.set_materials(3)
+        self.batch.set_materials("grass")  # one, as for a Terrain
         with self.assertRaisesRegex(ValueError, "material: 5 numbers, but the robots stand on 6"):
             self.batch.set_materials(["foam45", "grass"], material=[1] * 5)
         self.batch.set_materials(["foam45", "grass"], material=[1] * 6)
