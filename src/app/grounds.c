@@ -67,7 +67,7 @@ MildStatus grounds_model(const char *option, const CliArgs *args, int *model, Mi
         return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "unknown ground model '%.60s'; nearest is '%s' (mild info grounds lists all)",
+                     "unknown ground model '%.60s'; nearest is '%s' (mild info models lists all)",
                      name, text_nearest(name, (const char **)mild_model_names, MILD_MODELS));
 }
 

@@ -114,6 +114,9 @@ static void print_help(FILE *file) {
     for (int i = 0; i < COMMANDS; i++) {
         fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
+    fputs("\nOf the Python package: `mild trial` lets any policy walk on soft ground, `mild judge` "
+          "judges ground\nmodels by grains.\n",
+          file);
     fputs("\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on "
           "success and 2 after\nan error, which is one line on standard error.\n\ntry first:\n"
           "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
@@ -166,7 +169,7 @@ int main(int argc, char **argv) {
         printf("mild %s\n", build_version());
         return finish(0);
     }
-    const char *names[COMMANDS];
+    const char *names[COMMANDS + PACKAGE_COMMANDS];
     for (int i = 0; i < COMMANDS; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {
             return finish(commands[i].run(argc - 1, argv + 1));
@@ -177,7 +180,8 @@ int main(int argc, char **argv) {
         return package_run(argv + 1);
     }
     package_other(argv + 1);
+    memcpy(names + COMMANDS, package_commands, sizeof package_commands);
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
-            argv[1], text_nearest(argv[1], names, COMMANDS));
+            argv[1], text_nearest(argv[1], names, COMMANDS + PACKAGE_COMMANDS));
     return CLI_EXIT_BAD_INPUT;
 }

@@ -10,7 +10,7 @@
 #include "base/paths.h"
 #include "base/text.h"
 
-static const char *const commands[] = {"trial", "judge"};
+const char *const package_commands[PACKAGE_COMMANDS] = {"trial", "judge"};
 
 /* Like `python -m mild`, but the working directory is no place of packages: its files could be
  * anybody's. For this `trial` is not started, whose policies may be modules there. Arguments: what
@@ -26,7 +26,7 @@ static const char code[] = "import sys\n"
                            "sys.exit(main(words))\n";
 
 int package_has(const char *command) {
-    return text_find(command, commands, sizeof commands / sizeof *commands) >= 0;
+    return text_find(command, package_commands, PACKAGE_COMMANDS) >= 0;
 }
 
 void package_python(char python[PATH_SIZE]) {

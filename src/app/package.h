@@ -5,6 +5,10 @@
 
 #include "base/paths.h"
 
+enum { PACKAGE_COMMANDS = 2 };
+/* Names of those of them that are one word. */
+extern const char *const package_commands[PACKAGE_COMMANDS];
+
 /* Bool: it is one of them, of a word. */
 int package_has(const char *command);
 

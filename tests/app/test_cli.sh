@@ -7,6 +7,9 @@ expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
 expect 2 'usage: mild COMMAND' "$mild"
 bad "pres press" "$mild" pres
+bad "trials trial" "$mild" trials
+expect 0 '`mild trial`.*`mild judge`' "$mild" --help
+bad "mil_merged mild_merged models" "$mild" eval --model mil_merged
 commands=$("$mild" --help | sed -n 's/^  \([a-z]*\)   *[a-z].*/\1/p')
 [ "$(wc -w <<<"$commands")" -ge 10 ] || fail "commands of mild --help: $commands"
 for command in $commands; do
