@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "learn/policy_private.h"
 
@@ -298,8 +299,12 @@ static void say_where_to_go(const char *path, MildError *error) {
 Policy *policy_load(const char *path, char *note, int note_size, MildError *error) {
     Safetensors *file = safetensors_read(path, error);
     if (!file) {
+        char inside[512];
+        snprintf(inside, sizeof inside, "%.480s/policy.safetensors", path);
         if (error && error->status == MILD_ERROR_FORMAT) {
             say_where_to_go(path, error);
+        } else if (access(inside, R_OK) == 0) { /* a run folder */
+            mild_fail(error, MILD_ERROR_ARGUMENT, "%s: it is a folder; give %s", path, inside);
         }
         return NULL;
     }

@@ -72,6 +72,9 @@ done
 bad walk.pt "$mild" eval --policy walk.pt
 expect 2 '`python -m mild.rsl_rl walk.pt --out FILE`.*`mild trial ROBOT.xml FILE --describe LAYOUT`.*the .onnx that mjlab writes' "$mild" eval --policy walk.pt
 bad none.onnx "$mild" eval --policy none.onnx
+mkdir ran && touch ran/policy.safetensors
+bad "ran ran/policy.safetensors" "$mild" eval --policy ran
+rm -r ran
 # of an option only one counts, so a second is refused; of an override's key the last counts
 bad "--speed" "$mild" press --ground foam45 --speed 0.1 --depth 0.01 --speed=0.2
 bad "--threads" "$mild" eval --threads 1 --threads 1
