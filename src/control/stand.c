@@ -306,7 +306,7 @@ static void standing_act(void *self, int rows, TaskEnv *const *envs, float *acti
     const size_t bytes = (size_t)robot_joints(standing->robot) * sizeof(double);
     const double *pose = robot_default_pose(standing->robot);
     for (int e = 0; e < rows; e++) {
-        double target[ROBOT_JOINTS_MAX];
+        double target[ROBOT_JOINTS_MAX] = {0};
         memcpy(task_env_rest(envs[e])->gains.kp, robot_stand_kp(standing->robot), bytes);
         memcpy(task_env_rest(envs[e])->gains.kd, robot_stand_kd(standing->robot), bytes);
         task_env_load(envs[e], standing->sim);

@@ -501,7 +501,7 @@ TEST(float_text_is_near_it) {
         const Place *place = &places[i];
         static Worst worst;
         worst = (Worst){0};
-        run_place(place, kit_draws(8), 1e-4,
+        run_place(place, 2 + kit_draws(6), 1e-4,
                   place->kind == LEVEL ? contact_level_float : contact_map_float, &worst);
         worst_print(place->name, &worst);
         assert_true(quantile(worst.force, worst.steps, 0.5) < (place->exact ? 3e-6 : 1e-5));

@@ -167,8 +167,8 @@ TEST(what_the_policy_is_shown) {
 TEST(a_tilt) {
     for (int sign = -1; sign <= 1; sign += 2) {
         Runner *runner = make_runner();
-        double pitch = 0.02;
-        for (uint32_t k = 0; pitch < 1.1; k++, pitch += 0.05) { /* the limit is 1 */
+        for (uint32_t k = 0; k < 22; k++) {
+            const double pitch = 0.02 + 0.05 * k; /* the limit is 1 */
             StatePacket state = standing(k + 1, 0.01 * k);
             state.quaternion[0] = (float)cos(pitch / 2);
             state.quaternion[2] = (float)(sign * sin(pitch / 2));

@@ -311,14 +311,13 @@ TEST(the_end) {
     uint8_t bytes[PACKET_MAX];
     const PacketFormat format = {JOINTS, packet_robot(robot), NULL};
     Runner *runner = make_runner();
-    const RunnerReport *report = runner_report(runner);
     StatePacket end = standing(3, 0), state = standing(100, 0);
     end.mode = PACKET_end;
     assert_int_equal(take(runner, &end, -1), PACKET_FAULT_none); /* of no robot that walks */
     assert_true(runner_sender(runner) == 0 && runner_end(runner, 5, bytes) == 0);
     runner_destroy(runner);
     runner = make_runner();
-    report = runner_report(runner);
+    const RunnerReport *report = runner_report(runner);
     give(runner, &state, 0);
     tick(runner, 0, forward);
     assert_int_equal(take(runner, &end, 0.01), PACKET_FAULT_none); /* an old number */
