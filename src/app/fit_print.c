@@ -68,8 +68,8 @@ static void press_assumptions_print(const FitWork *work) {
 }
 
 static void assumptions_print(const FitWork *work, FitKind kind) {
-    static const char *const why[FIT_KINDS] = {"the law misses the curve (another --model?), or "
-                                               "the noise is slow",
+    static const char *const why[FIT_KINDS] = {("the law misses the curve (another --model?), or "
+                                                "the noise is slow"),
                                                "ground springs back along no straight line",
                                                "the law misses the curve, or the noise is slow",
                                                "the law misses the curve, or the noise is slow"};
