@@ -266,7 +266,7 @@ class Foot:
         self.pending[counted] = 0
         line = e.a - e.u_z  # shorter than the elastic travel where ground is stiffer than its chord, and in the first 0.1 mm
         fresh = np.maximum(e.m1 - e.a - self.dt * e.slices, 0)
-        e.regains = (fresh > 0) & (law.recovery * e.a <= ELASTIC) & (line >= e.q * ELASTIC * (1 - 1e-6))
+        e.regains = (fresh > 0) & (law.recovery * e.a <= ELASTIC) & (line >= (e.q - 1e-6) * ELASTIC)
         return np.where(e.regains, e.c - (e.c - q) * np.exp(-fresh / (law.regain_length * growth)), q)
 
     def remember(self, e):

@@ -175,7 +175,7 @@ MILD_HD void element_share_virgin(Element *e, Real q) {
 MILD_HD int share_grows(const Element *e, const Share *share) {
     const Real travel = e->yield_depth - e->zero_depth;
     return e->recovery * e->yield_depth <= ELEMENT_ELASTIC &&
-           travel >= share->q * (ELEMENT_ELASTIC * (1 - SHARE_ROUND));
+           travel >= (share->q - SHARE_ROUND) * ELEMENT_ELASTIC;
 }
 
 /* exp(-x) within 1e-14, 0 <= x <= SHARE_FORGET, and 1 at 0. The series of real_exp2, of which each
