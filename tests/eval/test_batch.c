@@ -123,7 +123,7 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
         near("cot", row, row->cot / own.cot, 1, 0.04);
         near("torque_max", row, row->torque_max / own.torque_max, 1, 0.06);
         near("clearance", row, row->clearance / own.clearance, 1, 0.04);
-        near("penetration", row, row->penetration, own.penetration, 0.03 * own.penetration);
+        near("penetration", row, row->penetration, own.penetration, 0.04 * own.penetration);
         near("drift", row, row->drift / own.drift, 1, 0.2);
         near("energy", row, row->energy / own.energy, 1, 0.04);
         near("base_oscillation", row, row->base_oscillation / own.base_oscillation, 1, 0.1);

@@ -239,15 +239,15 @@ static void walk_past(double x, float speed) {
 TEST(test_window) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk_past(3, 0.6f);
-    const double before = pressed_between(0.2, 2.2, 0.095f);
+    const double before = pressed_between(0.2, 2.2, 0.1f);
     web_again();
     walk_past(11, 1.0f);
     const double ahead = pressed_between(12, 15, 0);
-    assert_true(pressed_between(0.2, 2.2, 0.095f) != before); /* it has left the window */
+    assert_true(pressed_between(0.2, 2.2, 0.1f) != before); /* it has left the window */
     walk_past(4, -1.0f);
-    const double after = pressed_between(0.2, 2.2, 0.095f);
+    const double after = pressed_between(0.2, 2.2, 0.1f);
     printf("  %.3f m^2 pressed; after a way to 11 m and back to 4 m %.3f m^2\n", before, after);
-    assert_true(before > 0.05 && fabs(after / before - 1) < 0.05 && ahead == 0);
+    assert_true(before > 0.02 && fabs(after / before - 1) < 0.05 && ahead == 0);
 }
 
 /* [m] The deepest elements of the two feet of a robot that stands: means over six of eight seconds,
@@ -475,7 +475,7 @@ TEST(test_again) {
     web_again();
     printf("  turned to %.2f rad, shown %.2f rad, then %.2f rad\n", turned, (double)web_view()->yaw,
            facing());
-    assert_true(turned > 1 && turned < 2 && fabs((double)web_view()->yaw - turned) < 1e-5);
+    assert_true(turned > 1 && turned < 3 && fabs((double)web_view()->yaw - turned) < 1e-5);
     assert_true(fabs(facing() - turned) < 0.01);
     start(preset("foam25"), WEB_LEVEL, 1);
     walk(4, 0.6f);
