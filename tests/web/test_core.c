@@ -235,19 +235,19 @@ static void walk_past(double x, float speed) {
 
 /* The window follows the robot: what left it and comes back is what the ground remembers, which
  * standing up again leaves as it is. The slope around a print, which is drawn first, is no part of
- * that; it is up to 90 mm deep. */
+ * that; it is up to 80 mm deep. */
 TEST(test_window) {
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk_past(3, 0.6f);
-    const double before = pressed_between(0.2, 2.2, 0.1f);
+    const double before = pressed_between(0.2, 2.2, 0.085f);
     web_again();
     walk_past(11, 1.0f);
     const double ahead = pressed_between(12, 15, 0);
-    assert_true(pressed_between(0.2, 2.2, 0.1f) != before); /* it has left the window */
+    assert_true(pressed_between(0.2, 2.2, 0.085f) != before); /* it has left the window */
     walk_past(4, -1.0f);
-    const double after = pressed_between(0.2, 2.2, 0.1f);
+    const double after = pressed_between(0.2, 2.2, 0.085f);
     printf("  %.3f m^2 pressed; after a way to 11 m and back to 4 m %.3f m^2\n", before, after);
-    assert_true(before > 0.02 && fabs(after / before - 1) < 0.05 && ahead == 0);
+    assert_true(before > 0.05 && fabs(after / before - 1) < 0.05 && ahead == 0);
 }
 
 /* [m] The deepest elements of the two feet of a robot that stands: means over six of eight seconds,
@@ -470,12 +470,14 @@ TEST(test_again) {
            (double)web_view()->link[0][3], before, pressed());
     assert_true(fabs((double)web_view()->link[0][3] - x) < 0.1);
     assert_true(pressed() >= before);
+    const double from = facing();
     turn_away();
     const double turned = facing();
     web_again();
-    printf("  turned to %.2f rad, shown %.2f rad, then %.2f rad\n", turned, (double)web_view()->yaw,
-           facing());
-    assert_true(turned > 1 && turned < 3 && fabs((double)web_view()->yaw - turned) < 1e-5);
+    printf("  turned from %.2f to %.2f rad, shown %.2f rad, then %.2f rad\n", from, turned,
+           (double)web_view()->yaw, facing());
+    assert_true(fabs(turned - from - 2) < 0.3); /* 4 s at 0.5 rad/s */
+    assert_true(fabs((double)web_view()->yaw - turned) < 1e-5);
     assert_true(fabs(facing() - turned) < 0.01);
     start(preset("foam25"), WEB_LEVEL, 1);
     walk(4, 0.6f);
