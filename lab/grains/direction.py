@@ -23,6 +23,7 @@ import run  # noqa: E402
 RECORDS = ROOT / "lab/grains" / "records.tar.xz"
 PREDICTED = ROOT / "lab/grains" / "predicted.csv"
 FAMILIES = "led", "landing", "led_wide", "led_deep", "led_fine"
+STIFF = "landing_stiff"  # the landings on grains 16 times as stiff: the same predictions
 
 
 def numbers(case, rows):
@@ -84,13 +85,14 @@ def predict(args):
         csv.writer(file, lineterminator="\n").writerows([["case", "model", "number", "value"], *out])
 
 
-def measured(folder):
+def measured(folder, stiff):
     """{case: {number: (mean over beds, standard deviation of one)}}"""
     import judge
     found = {}
     for family in FAMILIES:
         for case in cases(family, 0.0):
-            beds = [judge.read_record(file) for file in sorted(folder.glob(f"{family}/{case.name}-[0-9]*.csv"))]
+            where = STIFF if stiff and family == "landing" else family
+            beds = [judge.read_record(file) for file in sorted(folder.glob(f"{where}/{case.name}-[0-9]*.csv"))]
             if beds:
                 each = [numbers(case, rows) for rows in beds]
                 found[f"{family}/{case.name}"] = {name: (np.mean([one[name] for one in each]), np.std([one[name] for one in each], ddof=1))
@@ -105,7 +107,7 @@ def vectors(values):
 
 
 def table(args):
-    grains = measured(pack.opened(args.records))
+    grains = measured(pack.opened(args.records), args.stiff)
     models = {}
     for file in args.predicted:
         with open(file, newline="", encoding="utf-8") as lines:
@@ -151,6 +153,7 @@ def main():
     parser.add_argument("--records", default=RECORDS, type=pathlib.Path, help="a folder or an archive")
     parser.add_argument("--predicted", default=[PREDICTED], type=pathlib.Path, nargs="+")
     parser.add_argument("--rows", action="store_true", help="every number")
+    parser.add_argument("--stiff", action="store_true", help=f"landings on {STIFF}")
     args = parser.parse_args()
     predict(args) if args.what == "predict" else table(args)
 

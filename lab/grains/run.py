@@ -33,7 +33,7 @@ V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 # Options of the beds. sand: the ground that laws are fitted to; slick: less friction; fine: half the grain; wide: room for
 # soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
 # roll with resistance, which lie as loose as natural sand; loose_thin, loose_thinner, loose_thick: as loose, with a
-# nearer and a further floor. led, landing: beds of their own for direction.py.
+# nearer and a further floor. led, landing: beds of their own for direction.py; landing_stiff: sound at 40 to 70 m/s in place of 10 to 18.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {
@@ -54,6 +54,7 @@ FAMILIES = {
     "led_deep": {"seeds": "11-13", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "led_fine": {"seeds": "11-13", "box": FINE, "grain": 0.0025, "friction": 0.5, "settle": 0.4},
     "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "steps": 50},
+    "landing_stiff": {"seeds": "11-12", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "stiffness": 1.6e7},
 }
 
 
@@ -117,6 +118,11 @@ TILTS = [f"square100-tilt8 {SQUARE} 8 {press(0.02)}", f"square100-tilt15 {SQUARE
 REPRESS = [f"square100-again {SQUARE} 0 {press(0.02)} {press(-0.002)} {press(0.025)}"]
 SWIPES = [f"square100-swipe15 {SQUARE} 0 {press(0.015)} swipe:10@0.5", f"disc120-swipe15 {DISC} 0 {press(0.015)} swipe:10@0.5"]
 
+LANDINGS = [landing("sa01-1", SA01, 0, 20, 1), landing("sa01-2", SA01, 0, 20, 2), landing("sa01-3", SA01, 0, 10, 3),
+            landing("sa01-heel", SA01, -10, 20, 1.5), landing("sa01-toe", SA01, 15, 20, 1.5),
+            landing("sa01-forward", SA01, 0, 20, 1.5, 1), landing("g1-2", G1, 0, 40, 2),
+            landing("g1-heel-forward", G1, -10, 20, 1.5, 0.5)]
+
 BLOCKS = [
     ("sand", FIRST),
     ("slick", FIRST),
@@ -165,15 +171,13 @@ BLOCKS = [
                                                                  (30, (-30, -15, 0, 15, 30))) for tilt in tilts]),
     ("led", [along(PLATE, tilt, 0.015, 0.03) for tilt in (-20, -10, 10, 20)] + [along(PLATE, -15, 0.015, 0.02, -0.02),
              f"onto-print {PLATE} 0 press:0.02@0.1 press:-0.005@0.2 move:0.2,0,0,0,0,0.275 press:0.025@0.1"]),
-    ("landing", [landing("sa01-1", SA01, 0, 20, 1), landing("sa01-2", SA01, 0, 20, 2), landing("sa01-3", SA01, 0, 10, 3),
-                 landing("sa01-heel", SA01, -10, 20, 1.5), landing("sa01-toe", SA01, 15, 20, 1.5),
-                 landing("sa01-forward", SA01, 0, 20, 1.5, 1), landing("g1-2", G1, 0, 40, 2),
-                 landing("g1-heel-forward", G1, -10, 20, 1.5, 0.5)]),
+    ("landing", LANDINGS),
     ("led_wide", [f"walk {SA01} -12 move:0.25,0,-0.4,3.5,0,0.08 move:0.02,0,-0.03,0,0,0.25 move:0.1,0,0.05,2,0,0.12 move:0.2,0,0.4,0,0,0.1",
                   f"run {SA01} 5 move:1,0,-1.2,0,0,0.03 move:0.3,0,-0.2,-1,0,0.06 move:0.5,0,0.3,3,0,0.06 move:0.5,0,1,0,0,0.05",
                   f"roll-hold {SA01} -8 press:0.02@0.2 move:0,0,0,5,0,0.05 hold:0.2"]),
     ("led_deep", [f"along+0-thin {PLATE},0.02 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3", f"along+0-tall {PLATE},0.2 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3"]),
     ("led_fine", [toward(STRIP, 0.06, -15, 60, 0.2), toward(STRIP, 0.06, 15, 30, 0.2), along(STRIP, -15, 0.012, 0.03, speed=0.2)]),
+    ("landing_stiff", LANDINGS),
 ]
 
 
@@ -202,13 +206,13 @@ def beds_of(family, seeds=""):
 
 
 def step_of(family):
-    """Time step [s] of the program: 25 in the collision of the two smallest grains."""
+    """Time step [s] of the program: `steps` in the collision of the two smallest grains."""
     bed = FAMILIES[family]
     radius = 0.45 * bed["grain"]
-    stiffness = 1e6 * bed["grain"]
+    stiffness = bed.get("stiffness", 1e6) * bed["grain"]
     if bed.get("contact") == "hertz":
         stiffness = 2 * bed["stiffness"] * math.sqrt(0.5 * radius * 0.01 * bed["grain"])
-    return math.pi * math.sqrt(0.5 * 2500 * 4 / 3 * math.pi * radius**3 / stiffness) / 25
+    return math.pi * math.sqrt(0.5 * 2500 * 4 / 3 * math.pi * radius**3 / stiffness) / bed.get("steps", 25)
 
 
 def seconds_of(case):
