@@ -34,6 +34,7 @@ V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 # soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
 # roll with resistance, which lie as loose as natural sand; loose_thin, loose_thinner, loose_thick: as loose, with a
 # nearer and a further floor. led, landing: beds of their own for direction.py; landing_stiff: sound at 40 to 70 m/s in place of 10 to 18.
+# walk, walk_rolling: as deep as under a robot, and so as dense: walk.py fits the models to them.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {
@@ -54,6 +55,8 @@ FAMILIES = {
     "led_deep": {"seeds": "11-13", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "led_fine": {"seeds": "11-13", "box": FINE, "grain": 0.0025, "friction": 0.5, "settle": 0.4},
     "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "steps": 50},
+    "walk": {"seeds": "1-3", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
+    "walk_rolling": {"seeds": "1-3", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8, "rolling": 0.1},
     "landing_stiff": {"seeds": "11-12", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "stiffness": 1.6e7},
 }
 
@@ -178,6 +181,8 @@ BLOCKS = [
     ("led_deep", [f"along+0-thin {PLATE},0.02 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3", f"along+0-tall {PLATE},0.2 0 press:0.04@0.2 move:0.1,0,0,0,0,0.3"]),
     ("led_fine", [toward(STRIP, 0.06, -15, 60, 0.2), toward(STRIP, 0.06, 15, 30, 0.2), along(STRIP, -15, 0.012, 0.03, speed=0.2)]),
     ("landing_stiff", LANDINGS),
+    ("walk", FIRST),
+    ("walk_rolling", FIRST),
 ]
 
 
