@@ -207,7 +207,9 @@ def walk(given, numbers, log=print):
     policy = Policy(arrays, given.policy, robot) if given.policy else None
     keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
-    robots = Robots(arrays, given.trials * given.samples, robot, {**keys, **ground_keys(believes)}, device, given.seed, given.threads)
+    # A GPU's time for a plan goes with its number of steps, so those of the tried plans are longer than the plant's.
+    tried = {**keys, **ground_keys(believes), "task.physics_dt": numbers["planner"]["physics_dt"]}
+    robots = Robots(arrays, given.trials * given.samples, robot, tried, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
     planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground, policy)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")

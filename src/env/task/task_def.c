@@ -163,7 +163,7 @@ const char *const task_gait_names[] = {"robot", TASK_GAIT_LIST(TASK_GAIT_NAME)};
 static const double gait_offsets[][4] = {{0}, TASK_GAIT_LIST(TASK_GAIT_OFFSETS)};
 const char *const task_start_names[TASK_STARTS] = {"stand", "back", "side", "any"};
 const MildField task_fields[] = {
-    T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; must divide 0.01, the policy step"),
+    T(physics_dt, D, 1, 0.0005, 0.01, "[s] physics step; must divide 0.01, the policy step"),
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
     T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to plus or minus this"),
     T(torque_share, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
