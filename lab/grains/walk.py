@@ -31,8 +31,9 @@ import pack  # noqa: E402
 
 RECORDS = ROOT / "lab/grains" / "records.tar.xz"
 GROUNDS = ROOT / "lab/grains" / "walk" / "grounds.json"
-# Beds under the robot by the family of records that the models are fitted to: deeper, because it sinks farther than plates.
+# Beds under the robot, and the families of presses that the models are fitted to, on beds as deep and so as dense.
 BEDS = {"sand": {"friction": 0.5, "rolling": 0}, "rolling": {"friction": 0.5, "rolling": 0.1}}
+PRESSES = {"sand": "walk", "rolling": "walk_rolling"}
 MODELS = ("mild", "mild_merged", "bekker", "ecc_quasi_3d")
 
 
@@ -60,11 +61,11 @@ def fit(args):
     pitch = walk_lead.pitch_of(feet_of(args.robot)[0])
     records, grounds = judge.Records(pack.opened(RECORDS), 0), {}
     for family in BEDS:
-        keys = [f"{family}/{name}" for name in judge.FITS[family][0]]
+        keys = [f"{PRESSES[family]}/{name}" for name in judge.FITS[family][0]]
         given = {key: (records.cases[key][0], judge.mean_rows(records.cases[key][1])) for key in keys}
         for model in MODELS:
             entry = GroundEntry(model, pitch=pitch)
-            entry.fit(given, records.ground(family))
+            entry.fit(given, records.ground(PRESSES[family]))
             grounds.setdefault(family, {})[model] = {name: text for name, text in entry.material.as_dict().items() if name != "model"}
     GROUNDS.parent.mkdir(exist_ok=True)
     GROUNDS.write_text(json.dumps(grounds, indent=1) + "\n")

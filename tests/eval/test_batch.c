@@ -87,8 +87,8 @@ static void near(const char *what, const EvalRow *row, double is, double wanted,
     }
 }
 
-/* All rows of a batch against MuJoCo's, each measure within what twelve trials scatter; two trials are
- * only begun where kit_short says so. */
+/* All rows of a batch against MuJoCo's, each measure within what twelve trials scatter; two trials
+ * are only begun where kit_short says so. */
 static void compare_rows(const char *const *names, const double *speeds, int speed_count,
                          double turn, int device) {
     MildError error = {0};

@@ -43,9 +43,14 @@ def pressed(numbers, model, depth, speed=0.05):
 
 
 def in_grains(depth):
-    files = sorted(walk.pack.opened(walk.RECORDS / "wide").glob("sa01-[0-9].csv"))
-    tables = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in files]
-    return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
+    """What the sole carries in a bed 120 mm deep, times how much more a disc carries in the deeper and denser bed of the walks."""
+
+    def mean(family, case):
+        files = sorted(walk.pack.opened(walk.RECORDS / family).glob(f"{case}-[0-9].csv"))
+        tables = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in files]
+        return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
+
+    return mean("wide", "sa01") * mean("walk", "disc120") / mean("sand", "disc120")
 
 
 def tilts(folder, slope):
