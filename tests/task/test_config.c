@@ -180,6 +180,7 @@ static TaskDef changed(void) {
     def.action_clip = 7;
     strcpy(def.torque_share, SHARES);
     def.torque_hold = 1;
+    def.speed_hold = 0.3;
     strcpy(def.kp, GAINS);
     strcpy(def.kd, "1.5");
     def.physics_dt = 0.001;

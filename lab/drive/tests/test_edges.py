@@ -24,7 +24,7 @@ class Drive(unittest.TestCase):
         """The ground that the runner knows is that of its log; targets ask for the share of the torque; the simulated robot went as it was told."""
         log, command = self.folder / "log.csv", ",".join(map(str, COMMAND))
         with contextlib.chdir(self.folder):
-            runner = Runner(MILD, "--command", command, "--torque-share", "0.87", "--log", str(log), patience=("--damp-after", "20", "--late", "10", "--stall-after", "20"))
+            runner = Runner(MILD, "--task.speed_hold=0", "--command", command, "--torque-share", "0.87", "--log", str(log), patience=("--damp-after", "20", "--late", "10", "--stall-after", "20"))
             there = json.loads(run("drive", "--simulate", "--lockstep", "--connect", f"127.0.0.1:{runner.port}", "--ground", "grass", "--seconds", 6.3, "--json", "-"))
             code, found, said = runner.end()
             self.assertEqual((code, found["end"], found["damps"], there["end"], there["fallen"], there["seconds"]), (0, "robot", 0, "time", False, 6.3), said)

@@ -5,42 +5,30 @@
 
 #include "base/text.h"
 
-static const char *const keys[] = {"gait_period",
-                                   "gait_slowing",
-                                   "gait_slow_below",
-                                   "standing_below",
-                                   "clock",
-                                   "history_stride",
-                                   "jump",
-                                   "jump_stance",
-                                   "scan",
-                                   "scan_ahead",
-                                   "scan_pitch",
-                                   "scan_hold",
-                                   "velocity_scale",
-                                   "height_scale",
-                                   "action_scale",
-                                   "action_clip",
-                                   "torque_share",
-                                   "torque_hold",
-                                   "kp",
-                                   "kd"};
+static const char *const keys[] = {"gait_period",    "gait_slowing", "gait_slow_below",
+                                   "standing_below", "clock",        "history_stride",
+                                   "jump",           "jump_stance",  "scan",
+                                   "scan_ahead",     "scan_pitch",   "scan_hold",
+                                   "velocity_scale", "height_scale", "action_scale",
+                                   "action_clip",    "torque_share", "torque_hold",
+                                   "speed_hold",     "kp",           "kd"};
 
 enum { KEYS = sizeof keys / sizeof *keys };
 
 /* A key of older files, which has no effect: a shell in soft ground ends no episode. */
 static const char gone[] = "shell_depth";
 
-/* Bool: of a height scan. A policy without one does not name it, so that policies and checkpoints
- * of before there were scans are the same. */
-static int is_scan_key(const char *name) {
-    return strncmp(name, "scan", strlen("scan")) == 0;
+/* Bool: of what the policy does not do, a height scan or a speed hold. It is not named, so that the
+ * policies and checkpoints of before there was either are the same. */
+static int is_off(const TaskDef *def, const char *name) {
+    return (def->scan == 0 && strncmp(name, "scan", strlen("scan")) == 0) ||
+           (def->speed_hold == 0 && strcmp(name, "speed_hold") == 0);
 }
 
 void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {
     size_t used = 0;
     for (int i = 0; i < KEYS && used < size; i++) {
-        if (def->scan == 0 && is_scan_key(keys[i])) {
+        if (is_off(def, keys[i])) {
             continue;
         }
         const MildField *field = mild_field_find(task_fields, task_field_count, keys[i], NULL);
