@@ -34,7 +34,7 @@ V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 # soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
 # roll with resistance, which lie as loose as natural sand; loose_thin, loose_thinner, loose_thick: as loose, with a
 # nearer and a further floor. led, landing: beds of their own for direction.py; landing_stiff: sound at 40 to 70 m/s in place of 10 to 18.
-# walk, walk_rolling: as deep as under a robot, and so as dense: walk.py fits the models to them.
+# walk, walk_rolling: as deep as under a robot, and so as dense: walk.py fits the models to them; sole, sole_rolling: so are these.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {
@@ -57,6 +57,8 @@ FAMILIES = {
     "landing": {"seeds": "11-13", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "steps": 50},
     "walk": {"seeds": "1-3", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8},
     "walk_rolling": {"seeds": "1-3", "box": DEEP, "grain": 0.005, "friction": 0.5, "settle": 0.8, "rolling": 0.1},
+    "sole": {"seeds": "11-11", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1},
+    "sole_rolling": {"seeds": "11-11", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "rolling": 0.1},
     "landing_stiff": {"seeds": "11-12", "box": "0.72,0.44,0.3", "grain": 0.005, "friction": 0.5, "settle": 1, "stiffness": 1.6e7},
 }
 
@@ -126,6 +128,8 @@ LANDINGS = [landing("sa01-1", SA01, 0, 20, 1), landing("sa01-2", SA01, 0, 20, 2)
             landing("sa01-forward", SA01, 0, 20, 1.5, 1), landing("g1-2", G1, 0, 40, 2),
             landing("g1-heel-forward", G1, -10, 20, 1.5, 0.5)]
 
+DEEP_SOLE = [f"g1-deep {G1} 0 press:0.12@0.1", f"g1-land {G1} 0 move:0,0,-1.2,0,0,0.2,20"]
+
 BLOCKS = [
     ("sand", FIRST),
     ("slick", FIRST),
@@ -183,6 +187,8 @@ BLOCKS = [
     ("landing_stiff", LANDINGS),
     ("walk", FIRST),
     ("walk_rolling", FIRST),
+    ("sole", DEEP_SOLE),
+    ("sole_rolling", DEEP_SOLE),
 ]
 
 

@@ -1,6 +1,6 @@
 """lab/grains/walk.py lead: the feet of a walk on mild_merged, led through mild_merged, find about the forces of that walk, up and
-forward; through ground of twice its strength they find more. The sole of the robot on that ground, pressed slowly, carries what it
-carries in grains. test_walk_lead.py SOURCE MILD"""
+forward; through ground of twice its strength they find more. The sole of the G1, led deeper than the presses of the fit, bears
+about what it bears in grains. test_walk_lead.py SOURCE MILD"""
 import contextlib
 import io
 import json
@@ -29,28 +29,25 @@ def forces(folder, numbers):
     return [[float(word) for word in row[:4]] for row in rows]
 
 
-def pressed(numbers, model, depth, speed=0.05):
-    """Force up under the level sole of the SA01, led down."""
+def pressed(numbers, model, depths, speed=0.1):
+    """Force up under the level sole of the G1, led down, at depths."""
     import mild
-    ground = mild.Ground([walk_lead.sole_of(walk.feet_of("sa01")[0])], walk_lead.material(numbers, model), dt=walk_lead.STEP)
+    ground = mild.Ground([walk_lead.sole_of(walk.feet_of("g1")[0])], walk_lead.material(numbers, model), dt=walk_lead.STEP)
     ground.inverse_inertia[:], ground.rotation[0] = 0, np.eye(3)
-    for step in range(round(depth / speed / ground.dt)):
+    table = []
+    for step in range(round(depths[-1] / speed / ground.dt) + 1):
         ground.position[0] = 0, 0, -speed * ground.dt * step
         ground.velocity[0] = ground.free_velocity[0] = 0, 0, -speed, 0, 0, 0
         ground.solve()
         ground.advance()
-    return ground.force[0, 2]
+        table.append((speed * ground.dt * step, ground.force[0, 2]))
+    return np.interp(depths, *np.array(table).T)
 
 
-def in_grains(depth):
-    """What the sole carries in a bed 120 mm deep, times how much more a disc carries in the deeper and denser bed of the walks."""
-
-    def mean(family, case):
-        files = sorted(walk.pack.opened(walk.RECORDS / family).glob(f"{case}-[0-9].csv"))
-        tables = [np.genfromtxt(file.read_text().splitlines(), delimiter=",", names=True) for file in files]
-        return np.mean([np.interp(depth, table["depth_m"], table["force_z_n"]) for table in tables])
-
-    return mean("wide", "sa01") * mean("walk", "disc120") / mean("sand", "disc120")
+def in_grains(family, depths):
+    record = walk.pack.opened(walk.RECORDS / family / "g1-deep-11.csv").read_text().splitlines()
+    table = np.genfromtxt(record, delimiter=",", names=True)
+    return np.array([table["force_z_n"][np.abs(table["depth_m"] - depth) < 0.008].mean() for depth in depths])
 
 
 def tilts(folder, slope):
@@ -85,8 +82,9 @@ with tempfile.TemporaryDirectory() as name:
     assert all(abs(led / walked - 1) < 0.06 for walked, led, _, _ in same)  # 0.84 with the 77 elements of the SA01
     assert same[0][2] < -50 and all(abs(led - walked) < 0.05 * abs(walked) + 3 for _, _, walked, led in same)
     assert all(b[1] > 1.3 * a[1] for a, b in zip(same[1:], stiff[1:]))
-for model, within in (("mild_merged", 0.08), ("mild", 0.12)):  # the sole's raster has 3 % more than its area
-    for depth in (0.01, 0.016):
-        law, grains = pressed(json.loads(walk.GROUNDS.read_text())["sand"][model], model, depth), in_grains(depth)
-        print(f"{model}, {1e3 * depth:.0f} mm: {law:.1f} N, grains {grains:.1f} N")
-        assert abs(law / grains - 1) < within
+DEPTHS = np.array([0.03, 0.05, 0.07, 0.09, 0.11])  # deeper than the presses of the fit
+for family, model, within in (("sand", "mild_merged", 0.05), ("sand", "mild", 0.05), ("rolling", "mild_merged", 0.2)):
+    law = pressed(json.loads(walk.GROUNDS.read_text())[family][model], model, DEPTHS)
+    share = law / in_grains("sole" if family == "sand" else "sole_rolling", DEPTHS)
+    print(f"{family}, {model}: force up under the G1's sole, of that in grains: {np.round(share, 2)}")
+    assert (np.abs(share - 1) < within).all()
