@@ -7,6 +7,7 @@ import pickle
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 import gymnasium
 import numpy as np
@@ -229,6 +230,18 @@ class Plan(unittest.TestCase):
         given.policy = str(ROOT / "policies/g1.safetensors")
         with self.assertRaisesRegex(ValueError, "g1.safetensors is not a policy of go1"):
             plan.walk(given, numbers, log=None)
+
+    def test_film(self):
+        """Each step of a path is shown at its time, then the film ends."""
+        shown, path = [], np.random.default_rng(1).normal(size=(3, 19))
+        film = unittest.mock.Mock()
+        film.show = lambda walker: shown.append((walker.data.time, walker.data.qpos.copy()))
+        with unittest.mock.patch("mild.trials.Film", return_value=film) as made:
+            plan.film("go1", path, "walk.mp4")
+        made.assert_called_once_with("walk.mp4")
+        film.close.assert_called_once_with()
+        np.testing.assert_allclose([time for time, _ in shown], [0, 0.01, 0.02], atol=1e-12)
+        np.testing.assert_array_equal([qpos for _, qpos in shown], path)
 
     def test_mirror(self):
         """Half a period later each joint does what its mirror image did."""

@@ -12,11 +12,12 @@ import math
 import pathlib
 import sys
 import time
+import types
 
 import numpy as np
 
 from gait import Gait, Policy, robot_ini
-from mild.envs import open_envs
+from mild.envs import DATA, open_envs
 
 HERE = pathlib.Path(__file__).resolve().parent
 PERIOD = 0.01  # [s] policy step
@@ -211,7 +212,7 @@ def walk(given, numbers, log=print):
     tried = {**keys, **ground_keys(believes), "task.physics_dt": numbers["planner"]["physics_dt"]}
     robots = Robots(arrays, given.trials * given.samples, robot, tried, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
-    planner = Planner(arrays, plant, robots, gait, numbers["planner"], believes != given.ground, policy)
+    planner = Planner(arrays, plant, robots, gait, numbers["planner"], bool(given.believes), policy)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
     yaw = yaw_of(np, start)
@@ -248,15 +249,32 @@ def walk(given, numbers, log=print):
             "plan_ms": float(np.median(times[1:] or times))}, np.array(path)
 
 
+def film(robot, path, file):
+    """qpos [step, 7 + joints] as a video. What is below the surface of the ground is not seen."""
+    import mujoco
+    from mild.trials import Film
+    spec = mujoco.MjSpec.from_file(str(DATA / "robots" / robot / f"{robot}.xml"))
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], rgba=[0.76, 0.7, 0.58, 1])
+    model = spec.compile()
+    data, pictures = mujoco.MjData(model), Film(file)
+    walker = types.SimpleNamespace(robot=types.SimpleNamespace(model=model, base=1), data=data, height=path[0, 2])
+    for k, data.qpos[:] in enumerate(path):
+        data.time = PERIOD * k
+        mujoco.mj_forward(model, data)
+        pictures.show(walker)
+    pictures.close()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default, words in (
             ("robot", "go1", "sa01, g1 or go1"), ("ground", "rigid", "rigid, or a preset (mild info grounds)"),
-            ("believes", "", "the ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
+            ("believes", "", "a ground without prints that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
             ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
             ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
             ("policy", "", "a policy's file: plans are offsets from its actions, in the gait's place"),
-            ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
+            ("numbers", str(HERE / "plan.json"), "costs and numbers of the planner"), ("video", "", "FILE.mp4 of the first trial"),
+            ("path", "", "file for qpos [step, trial, 7 + joints], .npy")):
         parser.add_argument("--" + name, type=type(default), default=default, help=words)
     given = parser.parse_args()
     try:
@@ -264,11 +282,13 @@ def main():
         if given.robot not in numbers:
             parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(numbers)}")
         result, path = walk(given, numbers[given.robot])
-    except (ImportError, OSError, ValueError) as error:
+        print(json.dumps(result), flush=True)
+        if given.path:
+            np.save(given.path, path)
+        if given.video:
+            film(given.robot, path[:, 0], given.video)
+    except (ImportError, OSError, RuntimeError, ValueError) as error:
         sys.exit(f"plan: {error}")
-    if given.path:
-        np.save(given.path, path)
-    print(json.dumps(result))
 
 
 if __name__ == "__main__":
