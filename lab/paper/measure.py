@@ -15,7 +15,7 @@ MILD = shlex.split(os.environ.get("MILD", str(ROOT / "build/mild")))
 SHIPPED = ROOT / "policies/paper"  # seed 1 of each, in half precision
 SEVEN = ["rigid", "rubber", "foam60", "foam45", "foam28", "grass", "sand_loose"]  # the paper's six and the rigid plane
 OF_PAPER = ["--model", "mild"]  # its law on sand too, where slip costs nothing
-ALONE = ["--task.speed_hold=0"]  # a policy is judged without the speed hold of configs/walk.ini
+ALONE = ["--task.speed_hold=0"]  # a policy is judged without the speed hold
 NINE = ["rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense"]
 TRAINED = ["mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "mild_merged", "rigid"]
 SLIPS = ["mild_slips", "mild_merged_slips"]  # trained where slip sinks: train.sh

@@ -209,7 +209,7 @@ def walk(given, numbers, log=print):
     keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
     # A GPU's time for a plan goes with its number of steps, so those of the tried plans are longer than the plant's.
-    tried = {**keys, **ground_keys(believes), "task.physics_dt": numbers["planner"]["physics_dt"]}
+    tried = {**keys, **ground_keys(believes), **numbers["planner"].get("keys", {})}
     robots = Robots(arrays, given.trials * given.samples, robot, tried, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
     planner = Planner(arrays, plant, robots, gait, numbers["planner"], bool(given.believes), policy)
@@ -244,7 +244,7 @@ def walk(given, numbers, log=print):
     walked = alive & (abs(moved[0] / given.seconds - speed) <= 0.2 * max(speed, 0.1))
     trials = [{"upright": round(float(u), 2), "forward": float(m[0]), "side": float(m[1]), "turned": float(m[2]), "walked": bool(w)}
               for u, m, w in zip(upright, moved.T, walked)]
-    return {"robot": robot, "ground": given.ground, "believes": believes, "speed": speed, "samples": given.samples,
+    return {"robot": robot, "ground": given.ground, "believes": given.believes, "speed": speed, "samples": given.samples,
             "walked": int(walked.sum()), "upright": int(alive.sum()), "trials": trials,
             "plan_ms": float(np.median(times[1:] or times))}, np.array(path)
 
@@ -286,7 +286,7 @@ def main():
         if given.path:
             np.save(given.path, path)
         if given.video:
-            film(given.robot, path[:, 0], given.video)
+            film(given.robot, path[:max(1, round(result["trials"][0]["upright"] / PERIOD)), 0], given.video)
     except (ImportError, OSError, RuntimeError, ValueError) as error:
         sys.exit(f"plan: {error}")
 
