@@ -254,7 +254,8 @@ def film(robot, path, file):
     import mujoco
     from mild.trials import Film
     spec = mujoco.MjSpec.from_file(str(DATA / "robots" / robot / f"{robot}.xml"))
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], rgba=[0.76, 0.7, 0.58, 1])
+    if all(geom.type != mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], rgba=[0.76, 0.7, 0.58, 1])
     model = spec.compile()
     data, pictures = mujoco.MjData(model), Film(file)
     walker = types.SimpleNamespace(robot=types.SimpleNamespace(model=model, base=1), data=data, height=path[0, 2])
