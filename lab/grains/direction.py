@@ -2,7 +2,7 @@
 """Plates that are led in any direction, and landings: what models predict, and what grains say (lab/grains/README.md).
 
     PYTHONPATH=build/python .venv/bin/python lab/grains/direction.py predict --out out/predicted.csv     no record is read but those of the fit
-    lab/grains/run.py --only '^(led|landing)' --out out/records                                           the records, 12 minutes of a GPU
+    lab/grains/run.py --only '^(led|landing/)' --out out/records                                           the records, 12 minutes of a GPU
     PYTHONPATH=build/python .venv/bin/python lab/grains/direction.py table [--rows] [--predicted out/predicted.csv]               errors of each model
 
 Numbers of a case: the force along and up [N], mean over the deepest 40 % of a way down or the second half of a way along; of a landing

@@ -34,7 +34,8 @@ V = 0.05  # [m/s] of plates that are led: inertial number under 0.005
 # soles and large plates; deep: as far as a robot's foot goes down; hertz, rolling: other contacts; medium, loose: grains that
 # roll with resistance, which lie as loose as natural sand; loose_thin, loose_thinner, loose_thick: as loose, with a
 # nearer and a further floor. led, landing: beds of their own for direction.py; landing_stiff: sound at 40 to 70 m/s in place of 10 to 18.
-# walk, walk_rolling: as deep as under a robot, and so as dense: walk.py fits the models to them; sole, sole_rolling: so are these.
+# walk, walk_rolling: about as deep as under a robot, and so as dense: walk.py fits the models to them. sole, sole_rolling: a robot's sole,
+# led as deep as it goes.
 BOX, WIDE, FINE, DEEP = "0.45,0.35,0.12", "0.72,0.44,0.12", "0.33,0.28,0.08", "0.5,0.4,0.25"
 LOOSE = {"seeds": "1-3", "box": "0.35,0.29,0.12", "grain": 0.004, "friction": 0.8, "rolling": 1}
 FAMILIES = {

@@ -31,7 +31,7 @@ import pack  # noqa: E402
 
 RECORDS = ROOT / "lab/grains" / "records.tar.xz"
 GROUNDS = ROOT / "lab/grains" / "walk" / "grounds.json"
-# Beds under the robot, and the families of presses that the models are fitted to, on beds as deep and so as dense.
+# Beds under the robot, and the families of presses that the models are fitted to, on beds about as deep and so as dense.
 BEDS = {"sand": {"friction": 0.5, "rolling": 0}, "rolling": {"friction": 0.5, "rolling": 0.1}}
 PRESSES = {"sand": "walk", "rolling": "walk_rolling"}
 MODELS = ("mild", "mild_merged", "bekker", "ecc_quasi_3d")

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Holds the numbers of `mild eval --json` to what the program says elsewhere: eval_numbers.py TABLE JSON STANCES TRACK ACTIONS FIRST TURN TURN_JSON.
-Table and JSON of two trials, their stances, track and actions as CSV, JSON of the first trial alone, table and JSON of a walk that turns."""
+"""Holds the numbers of `mild eval --json` to what the program says elsewhere: eval_numbers.py TABLE JSON STANCES TRACK ACTIONS THREE TURN TURN_JSON.
+Table and JSON of two trials, their stances, track and actions as CSV, JSON of three trials, table and JSON of a walk that turns."""
 import csv
 import json
 import math
 import re
+import statistics
 import sys
 
 failures = 0
@@ -38,8 +39,8 @@ def mean(values):
     return sum(values) / len(values)
 
 
-table, both, stances, track, actions, first, turn_table, turning = sys.argv[1:]
-one, r, s, t, a = row(first), row(both), rows(stances), rows(track), rows(actions)
+table, both, stances, track, actions, three, turn_table, turning = sys.argv[1:]
+m, r, s, t, a = row(three), row(both), rows(stances), rows(track), rows(actions)
 speed, upright, trials, velocity, half, cot, torque, clearance, sink, drift, power, sideways, asked_sideways = cells(table)[:13]
 for what, is_, wanted, within in (
         ("speed", r["speed"], speed, 0.005), ("success", r["success"], upright, 0), ("trials", r["trials"], trials, 0),
@@ -115,14 +116,15 @@ near("yaw_rate", r["yaw_rate"], rms([w[2:] for w in columns(settled, "omega")]),
 near("flight of a walk", r["flight"], 0, 0.005)
 near("joint_speed", r["joint_speed"], rms(columns(settled, "speed_", "_rad_s")), 0.002 * r["joint_speed"])
 
-# of two trials the first is known by itself; so the deviation is known: |x0 - mean| times the root of 2
-# (by itself its network works on one row instead of two, whose sums are rounded otherwise, which moves velocity and COT by 2e-8 of
-# themselves; the torques of both are printed)
-first = {"velocity": one["velocity"], "cot": one["cot"], "torque_max": r["each"][0]["torque_max"]}
-for name, key in (("velocity_deviation", "velocity"), ("cot_deviation", "cot"), ("torque_deviation", "torque_max")):
-    near(name, r[name], math.sqrt(2) * abs(first[key] - r[key]), 5e-8 * first[key])
-    if one[name] is not None:
+# The third trial beside the two is known by the means, and its deviation from them by theirs. (Not one beside two: a network rounds a row
+# that is alone otherwise.)
+for key in ("velocity", "cot", "torque_max"):
+    name = f"{key.removesuffix('_max')}_deviation"
+    third = 3 * m[key] - 2 * r[key]
+    near(name, m[name], math.sqrt((r[name]**2 + 2 * (r[key] - m[key])**2 + (third - m[key])**2) / 2), 1e-9 * m[key])
+    if row(turning)[name] is not None:
         near(f"{name} of one trial", 1, 0, 0)
+near("torque_deviation", r["torque_deviation"], statistics.stdev(one_of["torque_max"] for one_of in r["each"]), 1e-9 * r["torque_max"])
 
 turned, asked = cells(turn_table)[10:12]
 near("velocity_turn", row(turning)["velocity_turn"], turned, 5e-4)

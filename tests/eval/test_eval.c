@@ -217,7 +217,8 @@ TEST(a_row_is_what_its_trials_did) {
     MildError error = {0};
     TaskDef shorter = def, longer = def;
     shorter.episode = 1;
-    shorter.speed_hold = 0; /* as in the loop below */
+    assert_true(def.speed_hold > 0); /* as the file of the policy says */
+    shorter.speed_hold = 0;          /* as in the loop below */
     longer.episode = 3.5;
     const EvalDef eval = {
         .speed = 0.5, .sideways = 0.05, .trials = 2, .seconds = 3.5, .stop = 2.995, .seed = 7};

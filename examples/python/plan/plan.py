@@ -208,7 +208,7 @@ def walk(given, numbers, log=print):
     policy = Policy(arrays, given.policy, robot) if given.policy else None
     keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
-    # A GPU's time for a plan goes with its number of steps, so those of the tried plans are longer than the plant's.
+    # A GPU's time for a plan depends on the number of its steps, so the tried plans may have longer ones than the plant.
     tried = {**keys, **ground_keys(believes), **numbers["planner"].get("keys", {})}
     robots = Robots(arrays, given.trials * given.samples, robot, tried, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)

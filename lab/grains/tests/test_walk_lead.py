@@ -1,6 +1,7 @@
 """lab/grains/walk.py lead: the feet of a walk on mild_merged, led through mild_merged, find about the forces of that walk, up and
-forward; through ground of twice its strength they find more. The sole of the G1, led deeper than the presses of the fit, bears
-about what it bears in grains. test_walk_lead.py SOURCE MILD"""
+forward; through ground of twice its strength they find more. The fit finds the numbers of grounds.json again, and the sole of
+the G1, led deeper than its presses, bears about what it bears in grains. test_walk_lead.py SOURCE MILD"""
+import argparse
 import contextlib
 import io
 import json
@@ -82,6 +83,14 @@ with tempfile.TemporaryDirectory() as name:
     assert all(abs(led / walked - 1) < 0.06 for walked, led, _, _ in same)  # 0.84 with the 77 elements of the SA01
     assert same[0][2] < -50 and all(abs(led - walked) < 0.05 * abs(walked) + 3 for _, _, walked, led in same)
     assert all(b[1] > 1.3 * a[1] for a, b in zip(same[1:], stiff[1:]))
+with tempfile.TemporaryDirectory() as name:
+    kept, walk.GROUNDS = walk.GROUNDS, pathlib.Path(name) / "grounds.json"
+    walk.fit(argparse.Namespace(robot="sa01"))
+    again, walk.GROUNDS = json.loads(walk.GROUNDS.read_text()), kept
+for family, models in json.loads(walk.GROUNDS.read_text()).items():
+    for model, numbers in models.items():
+        for key, text in numbers.items():
+            assert text == again[family][model][key] or abs(float(again[family][model][key]) / float(text) - 1) < 1e-3, (family, model, key)
 DEPTHS = np.array([0.03, 0.05, 0.07, 0.09, 0.11])  # deeper than the presses of the fit
 for family, model, within in (("sand", "mild_merged", 0.05), ("sand", "mild", 0.05), ("rolling", "mild_merged", 0.2)):
     law = pressed(json.loads(walk.GROUNDS.read_text())[family][model], model, DEPTHS)

@@ -18,8 +18,8 @@ enum { KEYS = sizeof keys / sizeof *keys };
 /* A key of older files, which has no effect: a shell in soft ground ends no episode. */
 static const char gone[] = "shell_depth";
 
-/* Bool: of what the policy does not do, a height scan or a speed hold. It is not named, so that the
- * policies and checkpoints of before there was either are the same. */
+/* Bool: of a height scan or a speed hold, where the policy has none. Such keys are left out, so
+ * that files stay what they were before there were these keys. */
 static int is_off(const TaskDef *def, const char *name) {
     return (def->scan == 0 && strncmp(name, "scan", strlen("scan")) == 0) ||
            (def->speed_hold == 0 && strcmp(name, "speed_hold") == 0);
