@@ -5,7 +5,7 @@
 #include <cuda_runtime.h>
 
 #include "device/cuda.h"
-#include "env/batch_step.h"
+#include "env/batch_fork.h"
 #include "env/kernels.h"
 
 #ifndef ENVS_BLOCKS
@@ -218,9 +218,15 @@ static __global__ void __launch_bounds__(TALLY_THREADS)
     }
 }
 
+static __global__ void __launch_bounds__(TILE)
+    weigh(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsFork fork) {
+    env_weigh(&all, &fork, fork.first + blockIdx.x);
+}
+
 /* A block for each row of an environment. */
 static __global__ void __launch_bounds__(FORK_THREADS) save(const __grid_constant__ EnvsFork fork) {
-    env_move_row(&fork, (int)blockIdx.y, blockIdx.x, 1, (int)threadIdx.x, FORK_THREADS);
+    env_move_row(&fork, (int)blockIdx.y, fork.first + blockIdx.x, 1, (int)threadIdx.x,
+                 FORK_THREADS);
 }
 
 /* A block for each environment. */
@@ -231,7 +237,7 @@ static __global__ void __launch_bounds__(FORK_THREADS)
     __syncthreads();
     env_move_rows(&fork, robot, 0, (int)threadIdx.x, FORK_THREADS);
     __syncthreads();
-    if (threadIdx.x == 0) {
+    if (threadIdx.x < TILE) {
         env_take_back(&all, &fork, robot, &kept);
     }
 }
@@ -359,6 +365,7 @@ static const char *kernels_save(const EnvsArrays *all, const EnvsFork *fork, int
                                 MildStream stream) {
     OnDevice on(all->device);
     const dim3 grid((unsigned)blocks, (unsigned)fork->count);
+    weigh<<<blocks, TILE, 0, stream>>>(*all, *fork);
     save<<<grid, FORK_THREADS, 0, stream>>>(*fork);
     return launched();
 }

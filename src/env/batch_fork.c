@@ -19,7 +19,7 @@ static void read_piece(void *context, int piece, int thread) {
     envs_host_read(call->arrays, call->motion, piece);
 }
 
-/* The rows of a block, those of the ground last, so that a fork without them reads its beginning.
+/* The rows of a block in the order of RowKind, so that a fork with own_ground reads its beginning.
  * Returns its bytes. */
 static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
     EnvsArrays all = b->arrays;
@@ -27,8 +27,9 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
     Row rows[ROWS];
     size_t place = 0;
     batch_list_rows(b, &all, &ground, rows);
-    *fork = (EnvsFork){.own_ground = own_ground, .group = 1};
-    for (int kind = ROW_STATE; kind <= (own_ground ? ROW_STATE : ROW_GROUND); kind++) {
+    *fork = (EnvsFork){
+        .own_ground = own_ground, .group = 1, .shape = b->ground->shape, .ground = ground};
+    for (int kind = ROW_STATE; kind <= (own_ground ? ROW_PRINTS : ROW_GROUND); kind++) {
         for (int i = 0; i < ROWS; i++) {
             if ((int)rows[i].kind != kind || rows[i].bytes == 0) {
                 continue;
@@ -63,14 +64,12 @@ MildStatus batch_save(Envs *envs, int first, int count, void *blocks, MildStream
     }
     fork.stride = stride;
     fork.block = blocks;
-    for (int r = 0; r < fork.count; r++) {
-        fork.row[r].at += (size_t)first * fork.row[r].bytes;
-    }
+    fork.first = first;
     if (b->kernels) {
         return checked(b->kernels->save(&b->arrays, &fork, count, stream), error);
     }
     for (int i = 0; i < count; i++) {
-        envs_host_save(&fork, i);
+        envs_host_save(&b->arrays, &fork, first + i);
     }
     return MILD_OK;
 }
@@ -98,15 +97,15 @@ MildStatus batch_fork(Envs *envs, const void *blocks, int count, size_t stride, 
     fork.block = (char *)(uintptr_t)blocks; /* which are read */
     fork.stride = stride;
     fork.group = b->arrays.envs / count;
-    MildStatus status = MILD_OK;
-    if (b->kernels) {
-        status = checked(b->kernels->fork(&b->arrays, &fork, stream), error);
-    } else {
+    const MildStatus status =
+        own_ground ? mild_batch_reset(b->ground, NULL, stream, error) : MILD_OK;
+    if (status == MILD_OK && b->kernels) {
+        return checked(b->kernels->fork(&b->arrays, &fork, stream), error);
+    }
+    if (status == MILD_OK) {
         pool_run(b->pool, b->arrays.envs, fork_piece, &call);
     }
-    return status == MILD_OK && own_ground
-               ? mild_batch_reset(b->ground, b->arrays.reset, stream, error)
-               : status;
+    return status;
 }
 
 MildStatus batch_read(Envs *envs, const EnvsMotion *motion, MildStream stream, MildError *error) {

@@ -1,7 +1,7 @@
 /* The batch engine on the CPU: the functions of the GPU, environment after environment. */
 #define MILD_REAL_FLOAT
 
-#include "env/batch_step.h"
+#include "env/batch_fork.h"
 #include "env/kernels.h"
 
 EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape) {
@@ -65,7 +65,8 @@ void envs_host_tally(const EnvsArrays *all) {
     }
 }
 
-void envs_host_save(const EnvsFork *fork, long robot) {
+void envs_host_save(const EnvsArrays *all, const EnvsFork *fork, long robot) {
+    env_weigh(all, fork, robot);
     env_move_rows(fork, robot, 1, 0, 1);
 }
 

@@ -52,6 +52,7 @@ typedef struct {
 /* What a fork does with an array. */
 typedef enum {
     ROW_STATE,  /* it is copied */
+    ROW_PRINTS, /* it is copied, and where the array is NULL all 0 */
     ROW_GROUND, /* it is copied, unless environments keep their own ground */
     ROW_WORK    /* it is left: nothing in it outlasts a policy step */
 } RowKind;

@@ -12,6 +12,7 @@ enum { ENVS_ROWS_MAX = 24 };
 typedef struct {
     char *block;    /* the first */
     size_t stride;  /* [B] from block to block */
+    long first;     /* environment of the first block */
     int group;      /* environments that have a block in common */
     int own_ground; /* bool: see envs_fork */
     int count;      /* of rows */
@@ -20,6 +21,8 @@ typedef struct {
         size_t bytes;
         size_t place; /* [B] in the block */
     } row[ENVS_ROWS_MAX];
+    BatchShape shape; /* of the feet's ground */
+    BatchArrays ground;
 } EnvsFork;
 
 #define ENVS_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
@@ -53,7 +56,7 @@ void envs_host_move_progress(const EnvsArrays *all, int back);
 /* Fills arrays.tally. */
 void envs_host_tally(const EnvsArrays *all);
 /* From the environment to its block, from the block to the environment. */
-void envs_host_save(const EnvsFork *fork, long robot);
+void envs_host_save(const EnvsArrays *all, const EnvsFork *fork, long robot);
 void envs_host_fork(const EnvsArrays *all, const EnvsFork *fork, long robot);
 void envs_host_read(const EnvsArrays *all, const EnvsMotion *motion, long robot);
 

@@ -17,6 +17,9 @@ Episode episode_of(const Envs *envs, int i) {
                        .friction = from->variation.rigid_friction,
                        .rigid_time = from->variation.rigid_time,
                        .map = {map[0], map[1]}};
+    for (int f = 0; f < from->shape.feet; f++) {
+        episode.load += env_reading(env_robot_at(all, i))->foot[f].force[2];
+    }
     memcpy(episode.ground, from->ground, sizeof episode.ground);
     for (int k = 0; k < 3; k++) {
         episode.command[k] = from->command[k];
@@ -33,4 +36,9 @@ Episode episode_of(const Envs *envs, int i) {
 
 void episode_throw(const Envs *envs, int i, double speed) {
     env_at(envs_batch_arrays(envs), i)->robot.qvel[0] = (float)speed;
+}
+
+void episode_stop(const Envs *envs, int i) {
+    TaskEnv *env = env_at(envs_batch_arrays(envs), i);
+    memset(env->robot.qvel, 0, sizeof env->robot.qvel);
 }

@@ -17,6 +17,7 @@ typedef struct {
     double map[2];                  /* [m] */
     double command[3];              /* [m/s, m/s, rad/s] */
     double qpos[ROBOT_NQ_MAX];
+    double load; /* [N] on the feet in the last step */
     double kp_scale[ROBOT_JOINTS_MAX];
     float action[ROBOT_JOINTS_MAX]; /* newest, of driven joints too */
 } Episode;
@@ -25,5 +26,7 @@ typedef struct {
 Episode episode_of(const Envs *envs, int i);
 /* Gives its base a speed [m/s] forward. */
 void episode_throw(const Envs *envs, int i, double speed);
+/* Stops it. */
+void episode_stop(const Envs *envs, int i);
 
 #endif

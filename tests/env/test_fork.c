@@ -4,6 +4,7 @@
 
 #include "base/random.h"
 #include "env/backend.h"
+#include "env/task/ground.h"
 #include "env/task/state.h"
 #include "episode.h"
 #include "ground/batch/batch.h"
@@ -223,6 +224,70 @@ TEST(forks_keep_their_ground) {
         }
     }
     close_both();
+}
+
+/* Of one soil alone. */
+static TaskDef soil_def(const char *soil, TaskSoils *soils) {
+    TaskDef def = quiet_def();
+    MildError error = {0};
+    Robot *robot = kit_robot(SA01);
+    def.randomize.rigid_share = def.randomize.preset_jitter = def.randomize.slip_share = 0;
+    def.randomize.preset_share = 1;
+    for (int i = 0; i < 2; i++) {
+        def.randomize.mu[i] = 0.6;
+    }
+    snprintf(def.randomize.presets, sizeof def.randomize.presets, "%s", soil);
+    expect_good(task_soils_open(&def, robot, soils, &error) == MILD_OK, &error);
+    robot_destroy(robot);
+    return def;
+}
+
+/* A ground of their own that is the block's: as if it were copied. */
+TEST(forks_go_on_where_their_ground_is_the_same) {
+    TaskSoils soils;
+    const TaskDef def = soil_def("sand_loose", &soils);
+    open_both(SA01, &def, &def);
+    free(fork_both(1));
+    step_alike("their own sand");
+    close_both();
+}
+
+/* On another soft ground they stand `least` to `most` [m] deeper, with their prints, and bear what
+ * they bore, but for the drag of speed and the added mass. */
+static void check_load(const char *soil, double least, double most) {
+    TaskSoils soils[2];
+    const TaskDef sand = soil_def("sand_dense", &soils[0]), other = soil_def(soil, &soils[1]);
+    double deeper[MANY];
+    open_both(SA01, &sand, &other);
+    memset(both.a.action, 0, sizeof both.a.action);
+    memset(both.b.action, 0, sizeof both.b.action);
+    for (int t = 0; t < 20; t++) {
+        step_side(&both.a);
+    }
+    for (int e = 0; e < FEW; e++) {
+        episode_stop(both.a.envs, e);
+    }
+    free(fork_both(1));
+    for (int e = 0; e < MANY; e++) {
+        deeper[e] = episode_of(both.a.envs, 1 + e / (MANY / SAVED)).qpos[2] -
+                    episode_of(both.b.envs, e).qpos[2];
+    }
+    step_side(&both.a);
+    step_side(&both.b);
+    for (int e = 0; e < MANY; e++) {
+        const double bore = episode_of(both.a.envs, 1 + e / (MANY / SAVED)).load;
+        const double bears = episode_of(both.b.envs, e).load;
+        printf("%s: %.1f mm deeper, %.0f for %.0f N\n", soil, 1e3 * deeper[e], bears, bore);
+        assert_true(deeper[e] > least && deeper[e] < most);
+        expect_near("load", bears, bore, 0.12 * bore);
+    }
+    close_both();
+}
+
+TEST(forks_bear_what_they_bore) {
+    check_load("dry_sand_close", 0.01, 0.02);
+    check_load("foam25", 0.003, 0.015);
+    check_load("rubber", -0.02, -0.01);
 }
 
 /* The pose that is read is that of the environment. */

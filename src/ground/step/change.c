@@ -9,10 +9,9 @@
 #define POWER_CALLED /* power.h: no vector loop here needs a power */
 #include <string.h>
 
-#include "ground/law/begin.h"
 #include "ground/law/models.h"
 #include "ground/law/plate.h"
-#include "ground/law/share.h"
+#include "ground/law/rest.h"
 #include "ground/step/step.h"
 
 #define CHANGE_HALVINGS 40 /* of the depth; v is found to 1e-12 of it */
@@ -34,19 +33,13 @@ typedef struct {
 
 /* At a depth, of an element that has been at depth_max. worn: [-] its wear. */
 static ChangeHold change_hold(const ChangeGround *ground, Real depth, Real depth_max, Real worn) {
-    const ElementMemory memory = {depth_max, depth, 0, 0, 0, 0, 0, 0, 0};
-    Element e = {0};
-    e.law = ground->law;
-    e.law.line_stiffness *= ground->directed ? RESIST_PEAK : 1;
-    e.recovery = ground->recovery;
-    e.depth = depth;
-    const Real yield = element_begin_still(&e, &memory, LAW_ANY, 1, 1, 0);
-    const Real elastic = law_elastic_force(&e.law, LAW_ANY, depth);
-    const Real k = e.unload_stiffness;
-    const Real force = ground->wears ? share_force(&e, 1 - worn) : yield - elastic;
-    const Real x = real_max(depth - e.yield_depth + real_over(force, k + ELEMENT_TINY), 0);
-    const PowerWay way = power_way(e.law.elastic_force, e.law.elastic_exponent, 0, depth);
-    const ChangeHold hold = {k * x + elastic, k / 2 * x * x + way.mean * depth, e.added_mass};
+    Law law = ground->law;
+    law.line_stiffness *= ground->directed ? RESIST_PEAK : 1;
+    const ElementRest rest =
+        element_rest(&law, ground->recovery, LAW_ANY, depth, depth_max, ground->wears, worn);
+    const Real k = rest.stiffness, x = rest.travel;
+    const PowerWay way = power_way(law.elastic_force, law.elastic_exponent, 0, depth);
+    const ChangeHold hold = {rest_force(&rest), k / 2 * x * x + way.mean * depth, rest.added_mass};
     return hold;
 }
 
