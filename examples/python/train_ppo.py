@@ -58,14 +58,13 @@ class Rollout:
         self.envs, self.device, self.steps = envs, device, steps
         self.history = torch.zeros(steps + 1, n, envs.frames, envs.observation, **where)
         self.critic = torch.zeros(steps + 1, n, envs.critic, **where)
-        self.last_critic = torch.zeros(steps, n, envs.critic, **where)  # where an episode ended: before the next one began
         self.action = torch.zeros(steps, n, envs.actions, **where)
         self.mean, self.log_prob = torch.zeros_like(self.action), torch.zeros(steps, n, **where)
         self.std = torch.zeros(envs.actions, **where)
         self.reward = torch.zeros(steps, n, **where)
         self.done, self.timeout, self.valid = (torch.zeros(steps, n, dtype=torch.bool, **where) for _ in range(3))
-        self.slots = [envs.buffers(history=self.history[t + 1], critic=self.critic[t + 1], last_critic=self.last_critic[t], reward=self.reward[t],
-                                   done=self.done[t], timeout=self.timeout[t], valid=self.valid[t]) for t in range(steps)]
+        self.slots = [envs.buffers(history=self.history[t + 1], critic=self.critic[t + 1], reward=self.reward[t], done=self.done[t],
+                                   timeout=self.timeout[t], valid=self.valid[t]) for t in range(steps)]
         envs.reset(self.slots[-1], stream=self.stream())
 
     def stream(self):
@@ -85,9 +84,10 @@ class Rollout:
     @torch.no_grad()
     def advantages(self, value):
         """Generalised advantages and the returns that the critic should have foreseen, (steps, envs). An episode that only ran out of time
-        would have gone on: what was left of it is the critic's guess."""
-        values, left = value(self.critic).squeeze(-1), value(self.last_critic).squeeze(-1)
-        follows = torch.where(self.done, torch.where(self.timeout, left, 0), values[1:])
+        would have gone on: what was left of it is the critic's guess of one step before, as in `mild train` (the batch engine keeps no end
+        of an episode)."""
+        values = value(self.critic).squeeze(-1)
+        follows = torch.where(self.done, torch.where(self.timeout, values[:-1], 0), values[1:])
         delta, advantage = self.reward + GAMMA * follows - values[:-1], torch.zeros_like(self.reward)
         sum_ahead = torch.zeros_like(self.reward[0])
         for t in reversed(range(self.steps)):

@@ -52,17 +52,17 @@ class OneFile(unittest.TestCase):
         """As defined (Schulman et al. 2016): the discounted sum of what each step was better than foreseen, to the end of its episode."""
         torch.manual_seed(1)
         rollout = train_ppo.Rollout(Aim(), 12, torch.device("cpu"))
-        rollout.critic.normal_(), rollout.last_critic.normal_(), rollout.reward.normal_()
+        rollout.critic.normal_(), rollout.reward.normal_()
         rollout.done.copy_(torch.rand(12, 64) < 0.2)
         rollout.timeout.copy_(rollout.done & (torch.rand(12, 64) < 0.5))
         rollout.valid[:], rollout.valid[4, 3] = True, False
         found, target = rollout.advantages(lambda numbers: numbers[..., :1])
-        value, left = rollout.critic[..., 0], rollout.last_critic[..., 0]
+        value = rollout.critic[..., 0]
         for e in range(0, 64, 8):
             for t in range(12):
                 wanted, weight = 0.0, 1.0
                 for k in range(t, 12):
-                    ahead = value[k + 1, e] if not rollout.done[k, e] else left[k, e] if rollout.timeout[k, e] else 0
+                    ahead = value[k + 1, e] if not rollout.done[k, e] else value[k, e] if rollout.timeout[k, e] else 0
                     wanted += weight * (rollout.reward[k, e] + train_ppo.GAMMA * ahead - value[k, e])
                     weight *= train_ppo.GAMMA * train_ppo.LAMBDA
                     if rollout.done[k, e]:
