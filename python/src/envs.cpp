@@ -102,6 +102,9 @@ static std::unique_ptr<Buffers> make_buffers(const Envs &envs, nb::handle histor
     if (history.is_none() || reward.is_none()) {
         raise(PyExc_TypeError, "history, reward: they must be arrays");
     }
+    if (last.is_none() && !last_critic.is_none()) {
+        raise(PyExc_TypeError, "last_critic: it is written together with last, which is None");
+    }
     step.next.history = view_row(*buffers, history, "history", frames, where);
     step.next.critic = view_row(*buffers, critic, "critic", {n, shape.critic}, where);
     step.next.frame = view_row(*buffers, frame, "frame", {n, shape.observation}, where);
@@ -371,11 +374,11 @@ NB_MODULE(_envs, module) {
              nb::arg("last").none() = nb::none(), nb::arg("last_critic").none() = nb::none(),
              nb::arg("terms").none() = nb::none(),
              "Checks arrays once, for many steps. float32: history (envs, frames, observation), "
-             "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
-             "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
-             "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
-             "the device of the\nenvironments, no two in the same memory. Raises TypeError or "
-             "ValueError with the name of the array that does not fit.")
+             "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), terms "
+             "(envs,\nrewards), reward (envs,), and last, with it last_critic: as history and "
+             "critic at the end of\nepisodes, not of the batch engine. bool or uint8 (envs,): "
+             "done, timeout, valid. On the device\nof the environments, no two in the same memory. "
+             "Raises TypeError or ValueError with the\nname of the array that does not fit.")
         .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
              "New episodes; writes history, critic, frame and estimate.")
         .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
@@ -394,8 +397,9 @@ NB_MODULE(_envs, module) {
             "Puts blocks into all environments, the first into the first of as many equal groups, "
             "and so\non; of these or of others with the same keys but train.envs and "
             "task.physics_dt (and train.seed,\nif it draws the same grounds). own_ground: each "
-            "keeps its ground, which forgets the feet, and\nthe robot is set down on it as deep as "
-            "it stands there; then randomize may differ, too.")
+            "keeps its ground. Where both are soft, robot\nand prints move up or down until the "
+            "feet bear at rest what they bore; where one is\nrigid, prints go and the robot is set "
+            "down as deep as it stands; randomize may differ, too.")
         .def("read", read_motion, nb::kw_only(), nb::arg("qpos").none() = nb::none(),
              nb::arg("qvel").none() = nb::none(), nb::arg("torque").none() = nb::none(),
              nb::arg("stream") = 0,

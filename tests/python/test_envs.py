@@ -151,6 +151,8 @@ class Memory(unittest.TestCase):
         for name, width in (("critic", task.critic), ("last_critic", task.critic), ("frame", task.observation),
                             ("estimate", task.estimates)):
             arrays[name] = np.full((4, width), np.nan, np.float32)
+        with self.assertRaisesRegex(TypeError, "last_critic"):
+            task.buffers(**{**arrays, "last": None})
         buffers = task.buffers(**arrays)
         task.reset(buffers)
         ended = 0
