@@ -18,6 +18,7 @@ static const int first_of[SPEED_HOLD_PARTS + 1] = {TASK_FORWARD, TASK_TURN, TASK
 SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
     return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
                           .scale = task->velocity_scale,
+                          .most = task->speed_hold_most,
                           .clock = task_shape(task, robot).observation - 2};
 }
 
@@ -101,5 +102,9 @@ void speed_hold(SpeedHold *hold, const SpeedHoldDef *def, const float *frame,
     hold->sine = sine;
     for (int i = 0; i < 3; i++) {
         command[i] *= 1 + hold->ratio[i];
+    }
+    if (def->most > 0) {
+        command[TASK_FORWARD] =
+            fmin(command[TASK_FORWARD], fmax(hold->wanted[TASK_FORWARD], def->most));
     }
 }

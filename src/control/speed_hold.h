@@ -18,6 +18,7 @@
 typedef struct {
     double gain;  /* [-] TaskDef.speed_hold; 0: off */
     double scale; /* [-] of the velocity among the estimates */
+    double most;  /* [m/s] TaskDef.speed_hold_most; 0: no bound */
     int clock;    /* place of sin and cos of the gait's phase in a frame */
 } SpeedHoldDef;
 

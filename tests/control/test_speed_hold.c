@@ -169,6 +169,22 @@ TEST(speeding_up_teaches_nothing) {
     }
 }
 
+/* A policy may stop where it never was in training: it is commanded there by who wants it alone. */
+TEST(a_fast_command_is_bounded) {
+    Walker w = walker_at(3.5, 0.9);
+    w.def.most = 3.6;
+    walk(&w, CYCLE * 20);
+    expect_near("bound", w.command[0], 3.6, 1e-12);
+    w.wanted[0] = 3.8;
+    walk(&w, CYCLE * 20);
+    expect_near("wanted", w.command[0], 3.8, 1e-12);
+    w.wanted[0] = -0.5;
+    w.wanted[1] = 0.2;
+    walk(&w, CYCLE * 40);
+    expect_near("back", w.command[0], -0.5 / 0.9, 0.005);
+    expect_near("left", w.command[1], 0.2 / 0.9, 0.002);
+}
+
 /* A stick that moves by 0.2 m/s each second. */
 TEST(a_slow_ramp_teaches_nothing) {
     Walker w = walker_at(0.2, 0.9);
@@ -203,9 +219,10 @@ TEST(its_numbers_are_the_tasks) {
     const char *file = MILD_SOURCE_DIR "/policies/mild.safetensors";
     expect_good(controller_learned(file, robot, NULL, 1, &seeing, &error) == MILD_OK, &error);
     task.speed_hold = 0.1;
+    task.speed_hold_most = 3.6;
     task.velocity_scale = 3;
     const SpeedHoldDef def = speed_hold_def(&task, robot, &seeing);
-    assert_true(def.gain == 0.1 && def.scale == 3);
+    assert_true(def.gain == 0.1 && def.scale == 3 && def.most == 3.6);
     assert_int_equal(def.clock, task_shape(&task, robot).observation - 2);
     assert_true(speed_hold_def(&task, robot, &blind).gain == 0);
     Walker w = walker_at(0.4, 0.7);
