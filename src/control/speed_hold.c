@@ -8,6 +8,7 @@
 #define CHANGE_MAX 0.01 /* [m/s, rad/s] of the command that begins anew */
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r of the speeds can learn from */
 #define SETTLING 2      /* cycles after that */
+#define ACCELERATION 1  /* [m/s^2] with which a robot comes to another speed, at least */
 #define YAW_RATE 2      /* place in a frame [rad/s] */
 
 static const double ratio_max[3] = {0.2, 0.2, 0.4}; /* [-] */
@@ -17,6 +18,7 @@ static const int first_of[SPEED_HOLD_PARTS + 1] = {TASK_FORWARD, TASK_TURN, TASK
 SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
     return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
                           .scale = task->velocity_scale,
+                          .most = task->speed_hold_most,
                           .clock = task_shape(task, robot).observation - 2};
 }
 
@@ -41,7 +43,8 @@ static void pass_cycle(SpeedHold *hold, double gain) {
         if (hold->begun && hold->settling[part] == 0 && !useless) {
             learn(hold, part, gain);
         }
-        hold->settling[part] -= hold->settling[part] > 0;
+        const int last = part == SPEED_HOLD_LINEAR && hold->late > 0 ? 1 : 0;
+        hold->settling[part] -= hold->settling[part] > last;
     }
     hold->begun = 1;
     hold->turning = hold->steps = 0;
@@ -52,6 +55,11 @@ static void pass_cycle(SpeedHold *hold, double gain) {
 static void begin_anew(SpeedHold *hold, int part, const double command[3]) {
     hold->settling[part] = SETTLING;
     hold->cycles[part] = 0;
+    if (part == SPEED_HOLD_LINEAR) {
+        hold->late += hypot(command[TASK_FORWARD] - hold->wanted[TASK_FORWARD],
+                            command[TASK_LEFT] - hold->wanted[TASK_LEFT]) /
+                      ACCELERATION;
+    }
     for (int i = first_of[part]; i < first_of[part + 1]; i++) {
         hold->wanted[i] = command[i];
         hold->before[i] = 1 / (1 + hold->ratio[i]) - 1;
@@ -77,6 +85,7 @@ void speed_hold(SpeedHold *hold, const SpeedHoldDef *def, const float *frame,
         memcpy(hold->wanted, command, sizeof hold->wanted);
         return;
     }
+    hold->late = fmax(hold->late - TASK_PERIOD, 0);
     for (int part = 0; part < SPEED_HOLD_PARTS; part++) {
         if (has_changed(hold, part, command)) {
             begin_anew(hold, part, command);
@@ -93,5 +102,9 @@ void speed_hold(SpeedHold *hold, const SpeedHoldDef *def, const float *frame,
     hold->sine = sine;
     for (int i = 0; i < 3; i++) {
         command[i] *= 1 + hold->ratio[i];
+    }
+    if (def->most > 0) {
+        command[TASK_FORWARD] =
+            fmin(command[TASK_FORWARD], fmax(hold->wanted[TASK_FORWARD], def->most));
     }
 }

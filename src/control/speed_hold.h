@@ -6,7 +6,9 @@
  *     m += max(gain, 1/n) (v/command - m),    1/(1 + r) = known + n^2/(n^2 + 1) (m - known)
  *
  * over the n cycles since the wanted command changed; known = 1 at the start, and what r was where
- * it changed; |r| <= 0.2, of a turn 0.4. docs/controllers.md has what it is worth. */
+ * it changed; |r| <= 0.2, of a turn 0.4. A robot that speeds up is slower than it will be: two
+ * cycles after a change do not count, nor does any in a second for each m/s of it.
+ * docs/controllers.md has what it is worth. */
 #ifndef CONTROL_SPEED_HOLD_H
 #define CONTROL_SPEED_HOLD_H
 
@@ -16,6 +18,7 @@
 typedef struct {
     double gain;  /* [-] TaskDef.speed_hold; 0: off */
     double scale; /* [-] of the velocity among the estimates */
+    double most;  /* [m/s] TaskDef.speed_hold_most; 0: no bound */
     int clock;    /* place of sin and cos of the gait's phase in a frame */
 } SpeedHoldDef;
 
@@ -29,6 +32,7 @@ typedef struct {
     double before[3];               /* [-] 1/(1 + r) - 1 where the wanted command changed */
     double mean[3];                 /* [-] m */
     int settling[SPEED_HOLD_PARTS]; /* cycles that a start or another command makes useless */
+    double late;                    /* [s] until it has the speed of the command */
     double wanted[3];               /* [m/s, m/s, rad/s] */
     /* the cycle since the clock's last turn */
     double sine;               /* of its phase in the last frame */

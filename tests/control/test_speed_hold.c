@@ -12,6 +12,7 @@ typedef struct {
     double factor;      /* speed over command, of both directions */
     double turned;      /* the same of turning */
     double sway, noise; /* [m/s] of the estimate */
+    double pull, speed; /* [m/s^2] of speeding up, 0: it has its speed at once; [m/s] forward */
     double wanted[3], command[3];
     int step;
     Random random;
@@ -33,8 +34,13 @@ static void walk(Walker *w, int steps) {
         frame[CLOCK] = (float)sin(phase);
         frame[CLOCK + 1] = (float)cos(phase);
         for (int i = 0; i < 2; i++) {
-            const double v = w->factor * w->command[i] + w->sway * sin(2 * phase) +
-                             w->noise * (2 * random_unit(&w->random) - 1);
+            double own = w->factor * w->command[i];
+            if (i == 0 && w->pull > 0) {
+                const double most = w->pull * TASK_PERIOD;
+                own = w->speed += fmax(fmin(own - w->speed, most), -most);
+            }
+            const double v =
+                own + w->sway * sin(2 * phase) + w->noise * (2 * random_unit(&w->random) - 1);
             estimates[i] = (float)(w->def.scale * v);
         }
         frame[2] = (float)(w->turned * w->command[2] + w->sway * sin(phase));
@@ -141,6 +147,44 @@ TEST(another_command_must_settle) {
     expect_near("ratio", w.hold.ratio[0], 1 / 0.95 - 1, 1e-3);
 }
 
+/* A run comes to 3 m/s in 2.5 s. Of those it must learn nothing, or it would command up to a fifth
+ * more, and unlearn that in ten seconds. */
+TEST(speeding_up_teaches_nothing) {
+    for (int ramp = 0; ramp < 2; ramp++) {
+        Walker w = walker_at(ramp ? 0 : 3, 0.97);
+        w.pull = 1.2;
+        for (int k = 0; k < 20 * CYCLE; k++) {
+            w.wanted[0] = fmin(3, w.wanted[0] + 0.03); /* in a second, or at once */
+            walk(&w, 1);
+            assert_true(w.hold.ratio[0] < 1 / 0.97 - 1 + 1e-3);
+            assert_true(w.hold.ratio[0] == 0 || w.speed > 0.99 * 0.97 * 3);
+        }
+        expect_near("speed", w.speed, 3, 0.01);
+        w.wanted[0] = -1; /* and it brakes for long */
+        const double learned = w.hold.ratio[0];
+        while (w.speed > -0.97) {
+            walk(&w, 1);
+            assert_true(w.hold.ratio[0] == learned);
+        }
+    }
+}
+
+/* A policy may stop where it never was in training: it is commanded there by who wants it alone. */
+TEST(a_fast_command_is_bounded) {
+    Walker w = walker_at(3.5, 0.9);
+    w.def.most = 3.6;
+    walk(&w, CYCLE * 20);
+    expect_near("bound", w.command[0], 3.6, 1e-12);
+    w.wanted[0] = 3.8;
+    walk(&w, CYCLE * 20);
+    expect_near("wanted", w.command[0], 3.8, 1e-12);
+    w.wanted[0] = -0.5;
+    w.wanted[1] = 0.2;
+    walk(&w, CYCLE * 40);
+    expect_near("back", w.command[0], -0.5 / 0.9, 0.005);
+    expect_near("left", w.command[1], 0.2 / 0.9, 0.002);
+}
+
 /* A stick that moves by 0.2 m/s each second. */
 TEST(a_slow_ramp_teaches_nothing) {
     Walker w = walker_at(0.2, 0.9);
@@ -175,9 +219,10 @@ TEST(its_numbers_are_the_tasks) {
     const char *file = MILD_SOURCE_DIR "/policies/mild.safetensors";
     expect_good(controller_learned(file, robot, NULL, 1, &seeing, &error) == MILD_OK, &error);
     task.speed_hold = 0.1;
+    task.speed_hold_most = 3.6;
     task.velocity_scale = 3;
     const SpeedHoldDef def = speed_hold_def(&task, robot, &seeing);
-    assert_true(def.gain == 0.1 && def.scale == 3);
+    assert_true(def.gain == 0.1 && def.scale == 3 && def.most == 3.6);
     assert_int_equal(def.clock, task_shape(&task, robot).observation - 2);
     assert_true(speed_hold_def(&task, robot, &blind).gain == 0);
     Walker w = walker_at(0.4, 0.7);

@@ -181,6 +181,7 @@ static TaskDef changed(void) {
     strcpy(def.torque_share, SHARES);
     def.torque_hold = 1;
     def.speed_hold = 0.3;
+    def.speed_hold_most = 3.6;
     strcpy(def.kp, GAINS);
     strcpy(def.kd, "1.5");
     def.physics_dt = 0.001;

@@ -5,13 +5,28 @@
 
 #include "base/text.h"
 
-static const char *const keys[] = {"gait_period",    "gait_slowing", "gait_slow_below",
-                                   "standing_below", "clock",        "history_stride",
-                                   "jump",           "jump_stance",  "scan",
-                                   "scan_ahead",     "scan_pitch",   "scan_hold",
-                                   "velocity_scale", "height_scale", "action_scale",
-                                   "action_clip",    "torque_share", "torque_hold",
-                                   "speed_hold",     "kp",           "kd"};
+static const char *const keys[] = {"gait_period",
+                                   "gait_slowing",
+                                   "gait_slow_below",
+                                   "standing_below",
+                                   "clock",
+                                   "history_stride",
+                                   "jump",
+                                   "jump_stance",
+                                   "scan",
+                                   "scan_ahead",
+                                   "scan_pitch",
+                                   "scan_hold",
+                                   "velocity_scale",
+                                   "height_scale",
+                                   "action_scale",
+                                   "action_clip",
+                                   "torque_share",
+                                   "torque_hold",
+                                   "speed_hold",
+                                   "speed_hold_most",
+                                   "kp",
+                                   "kd"};
 
 enum { KEYS = sizeof keys / sizeof *keys };
 
@@ -22,7 +37,8 @@ static const char gone[] = "shell_depth";
  * that files stay what they were before there were these keys. */
 static int is_off(const TaskDef *def, const char *name) {
     return (def->scan == 0 && strncmp(name, "scan", strlen("scan")) == 0) ||
-           (def->speed_hold == 0 && strcmp(name, "speed_hold") == 0);
+           (def->speed_hold == 0 && strcmp(name, "speed_hold") == 0) ||
+           (def->speed_hold_most == 0 && strcmp(name, "speed_hold_most") == 0);
 }
 
 void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {

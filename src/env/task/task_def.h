@@ -189,6 +189,7 @@ typedef struct {
     double gait_period;    /* [s] of fast commands, see task_gait_period */
     double gait_slowing, gait_slow_below; /* [-], [m/s] of slow ones */
     double speed_hold;                    /* [-] see control/speed_hold.h; 0: off */
+    double speed_hold_most;               /* [m/s] of the commands it makes; 0: no bound */
     double stance_share[2]; /* [-] of the period: running, walking; see task_gait_share */
     double run_speed[2];    /* [m/s] up to which it walks, from which it runs */
     double swing_apex;      /* [m] */
