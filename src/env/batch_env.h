@@ -21,7 +21,6 @@ typedef struct {
     int label; /* of the map under the base */
     Real tally[TALLY_KEPT];
     int diverged; /* bool: in this policy step */
-    Real load;    /* [N] at rest on soft ground when it was saved, of batch_fork.h */
 } EnvRobot;
 
 /* Besides, where shells stand, on either ground. */

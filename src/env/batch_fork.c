@@ -19,6 +19,10 @@ static void read_piece(void *context, int piece, int thread) {
     envs_host_read(call->arrays, call->motion, piece);
 }
 
+static size_t whole(size_t bytes) {
+    return (bytes + BLOCK_ALIGN - 1) / BLOCK_ALIGN * BLOCK_ALIGN;
+}
+
 /* The rows of a block in the order of RowKind, so that a fork with own_ground reads its beginning.
  * Returns its bytes. */
 static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
@@ -38,7 +42,11 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
             fork->row[fork->count].bytes = rows[i].bytes;
             fork->row[fork->count].place = place;
             fork->count++;
-            place += (rows[i].bytes + BLOCK_ALIGN - 1) / BLOCK_ALIGN * BLOCK_ALIGN;
+            place += whole(rows[i].bytes);
+        }
+        if (kind == ROW_PRINTS) {
+            fork->rest = place;
+            place += whole((1 + batch_worn_numbers(&fork->shape)) * sizeof(float));
         }
     }
     return place;

@@ -1,10 +1,12 @@
 /* Saving an environment of the batch engine and putting it into others: envs_save, envs_fork.
  *
- * On another soft ground, own_ground, a robot takes its prints along. Both are shifted by the depth
- * d at which the feet bear at rest what they bore in the block,
+ * On another soft ground, own_ground, an element keeps its place on its unloading line, s: the
+ * share of the force that it bore at the greatest depth a. On ground that gives back r of a, at the
+ * depth u,
  *
- *     sum of F_own(u + d, u_max + d) = sum of F_block(u, u_max),     u: depth of an element
- * which is 0 on the same ground. */
+ *     a = u + (1 - s) max(r a, ELEMENT_ELASTIC)
+ * The robot is moved to the height at which the feet bear at rest what they bore in the block. On
+ * the same ground nothing moves. */
 #ifndef ENVS_BATCH_FORK_H
 #define ENVS_BATCH_FORK_H
 
@@ -13,8 +15,14 @@
 #include "ground/law/rest.h"
 
 #define FORK_HALVINGS 20
-#define FORK_DEEPEST REAL(0.5) /* [m] by which prints may be shifted, either way */
-#define FORK_SAME REAL(1e-3)   /* [-] of the load: nothing is shifted for less */
+#define FORK_PRINT REAL(20)    /* [-] of an element's depth: the deepest u_max that it is given */
+#define FORK_DEEPEST REAL(0.5) /* [m] by which a robot may be moved, either way */
+#define FORK_SAME REAL(1e-3)   /* [-] of the load: grounds are the same */
+
+/* That of an environment. */
+MILD_HD char *env_block(const EnvsFork *fork, long robot) {
+    return fork->block + (size_t)((robot - fork->first) / fork->group) * fork->stride;
+}
 
 /* Row r of an environment to (save: bool) or from its block, by lane of lanes. Rows of whole words
  * begin at one, on either side. */
@@ -22,8 +30,7 @@ MILD_HD void env_move_row(const EnvsFork *fork, int r, long robot, int save, int
     const size_t bytes = fork->row[r].bytes;
     const int there = fork->row[r].at != NULL;
     char *own = there ? fork->row[r].at + (size_t)robot * bytes : NULL;
-    const size_t number = (size_t)((robot - fork->first) / fork->group);
-    char *block = fork->block + number * fork->stride + fork->row[r].place;
+    char *block = env_block(fork, robot) + fork->row[r].place;
     char *to = save ? block : own;
     const char *from = save ? own : block;
     const size_t words = bytes % sizeof(float) ? 0 : bytes / sizeof(float);
@@ -108,33 +115,62 @@ MILD_HD const ContactMaterial *env_stands_on(const EnvsArrays *all, const EnvsFo
            env_within(material, fork->shape.materials) * fork->shape.feet + f;
 }
 
-/* [N] What element e of foot f bears at rest `deeper` [m]. */
-MILD_HD Real env_element_bears(const EnvsArrays *all, const EnvsFork *fork, long robot,
-                               const EnvPrints *prints, int f, int e, Real deeper) {
+/* In the block: the load at rest [N], then s of each element [-], as prints. */
+MILD_HD Real *env_rest(const EnvsFork *fork, long robot) {
+    return (Real *)(void *)(env_block(fork, robot) + fork->rest);
+}
+
+/* [N] What element e of foot f bears at rest. */
+MILD_HD Real env_element_bears(const EnvsArrays *all, const EnvsFork *fork, long robot, int f,
+                               int e, Real depth, Real depth_max) {
+    const EnvPrints prints = env_prints(fork, robot);
     const int stride = fork->shape.stride, at = f * stride + e;
     const Real *place = fork->ground.elements + f * CONTACT_PLACES * stride + e;
-    const Real depth_max = prints->numbers[at];
-    const Real depth = prints->numbers[prints->next + at] + deeper;
-    if (!(depth_max > 0 && depth > 0)) {
-        return 0;
-    }
-    const ContactMaterial *on = env_stands_on(all, fork, robot, prints, f, at);
+    const ContactMaterial *on = env_stands_on(all, fork, robot, &prints, f, at);
     const Law law = on->projects > 0 ? law_of_heap(on->law, place[CONTACT_BEGIN * stride],
                                                    place[CONTACT_WIDTH * stride])
                                      : on->law;
-    const ElementRest rest =
-        element_rest(&law, on->recovery, LAW_ANY, depth, depth_max + deeper, prints->worn != NULL,
-                     prints->worn ? prints->worn[at] : 0);
-    return rest_force(&rest);
+    const ElementRest rest = element_rest(&law, on->recovery, LAW_ANY, depth, depth_max,
+                                          prints.worn != NULL, prints.worn ? prints.worn[at] : 0);
+    return depth > 0 ? rest_force(&rest) : 0;
 }
 
-/* [N] What the ground bears at rest if feet and prints are `deeper` [m], by a tile. */
-MILD_HD Real env_bears(const EnvsArrays *all, const EnvsFork *fork, long robot, Real deeper) {
+/* [m] a above, at most FORK_PRINT times the depth. */
+MILD_HD Real env_deepest(Real recovery, Real share, Real depth) {
+    const Real left = real_max(1 - (1 - share) * recovery, 1 / FORK_PRINT);
+    return real_max(depth / left, depth + (1 - share) * ELEMENT_ELASTIC);
+}
+
+/* [N] What all bear at rest; by a tile. */
+MILD_HD Real env_bears(const EnvsArrays *all, const EnvsFork *fork, long robot) {
     const EnvPrints prints = env_prints(fork, robot);
     Real sum = 0;
     for (int f = 0; f < fork->shape.feet; f++) {
         for (int e = tile_lane(); e < fork->shape.elements[f]; e += TILE) {
-            sum += env_element_bears(all, fork, robot, &prints, f, e, deeper);
+            const Real *number = prints.numbers + f * fork->shape.stride + e;
+            if (number[0] > 0) {
+                sum += env_element_bears(all, fork, robot, f, e, number[prints.next], number[0]);
+            }
+        }
+    }
+    return tile_sum(sum);
+}
+
+/* The same of elements that lie `deeper` [m] and keep s. */
+MILD_HD Real env_bears_deeper(const EnvsArrays *all, const EnvsFork *fork, long robot,
+                              Real deeper) {
+    const EnvPrints prints = env_prints(fork, robot);
+    Real sum = 0;
+    for (int f = 0; f < fork->shape.feet; f++) {
+        for (int e = tile_lane(); e < fork->shape.elements[f]; e += TILE) {
+            const int at = f * fork->shape.stride + e;
+            const Real depth = prints.numbers[prints.next + at] + deeper;
+            if (prints.numbers[at] > 0) {
+                const Real recovery = env_stands_on(all, fork, robot, &prints, f, at)->recovery;
+                const Real share = env_rest(fork, robot)[1 + at];
+                sum += env_element_bears(all, fork, robot, f, e, depth,
+                                         env_deepest(recovery, share, depth));
+            }
         }
     }
     return tile_sum(sum);
@@ -142,45 +178,55 @@ MILD_HD Real env_bears(const EnvsArrays *all, const EnvsFork *fork, long robot, 
 
 /* Before an environment is saved, by a tile. */
 MILD_HD void env_weigh(const EnvsArrays *all, const EnvsFork *fork, long robot) {
-    const Real load = all->rigid[robot] ? 0 : env_bears(all, fork, robot, 0);
-    if (tile_lane() == 0) {
-        env_robot_at(all, robot)->load = load;
+    const EnvPrints prints = env_prints(fork, robot);
+    const Real load = env_bears(all, fork, robot);
+    Real *rest = env_rest(fork, robot);
+    for (int f = 0; f < fork->shape.feet; f++) {
+        for (int e = tile_lane(); e < fork->shape.elements[f]; e += TILE) {
+            const int at = f * fork->shape.stride + e;
+            const Real a = prints.numbers[at], u = prints.numbers[prints.next + at];
+            const Real bore = a > 0 ? env_element_bears(all, fork, robot, f, e, u, a) : 0;
+            const Real whole = a > 0 ? env_element_bears(all, fork, robot, f, e, a, a) : 0;
+            rest[1 + at] = real_over(bore, whole + ELEMENT_TINY);
+        }
     }
-    tile_sync();
+    if (tile_lane() == 0) {
+        rest[0] = load;
+    }
 }
 
-/* Feet and prints `deeper` [m]; elements that come out forget. By a tile. */
-MILD_HD void env_shift_prints(const EnvsFork *fork, long robot, Real deeper) {
+/* Moves the elements `deeper` [m]; those that come out forget. By a tile. */
+MILD_HD void env_shift_prints(const EnvsArrays *all, const EnvsFork *fork, long robot,
+                              Real deeper) {
     const EnvPrints prints = env_prints(fork, robot);
     for (int f = 0; f < fork->shape.feet; f++) {
         for (int e = tile_lane(); e < fork->shape.elements[f]; e += TILE) {
             const int at = f * fork->shape.stride + e;
             Real *number = prints.numbers + at;
+            const Real depth = number[prints.next] + deeper;
+            const Real recovery = env_stands_on(all, fork, robot, &prints, f, at)->recovery;
             const int loaded = number[0] > 0;
-            const int stays = loaded && number[prints.next] + deeper > 0;
-            number[0] += stays ? deeper : 0;
-            number[prints.next] += stays ? deeper : 0;
-            for (int n = 0; loaded && !stays && n < CONTACT_MEMORY; n++) {
+            if (loaded && depth > 0) {
+                number[0] = env_deepest(recovery, env_rest(fork, robot)[1 + at], depth);
+                number[prints.next] = depth;
+            }
+            for (int n = 0; loaded && !(depth > 0) && n < CONTACT_MEMORY; n++) {
                 number[n * prints.next] = 0;
             }
-            if (prints.worn && loaded && !stays) {
+            if (prints.worn && loaded && !(depth > 0)) {
                 prints.worn[at] = 0;
             }
         }
     }
 }
 
-/* [m] d above, by a tile. */
+/* [m] By how much deeper the feet bear what they bore, by a tile. */
 MILD_HD Real env_deeper(const EnvsArrays *all, const EnvsFork *fork, long robot) {
-    const Real load = env_robot_at(all, robot)->load;
-    const Real bears = env_bears(all, fork, robot, 0);
-    Real low = bears < load ? 0 : -FORK_DEEPEST, high = bears < load ? FORK_DEEPEST : 0;
-    if (REAL_ABS(bears - load) <= FORK_SAME * load) {
-        return 0;
-    }
+    const Real load = env_rest(fork, robot)[0];
+    Real low = -FORK_DEEPEST, high = FORK_DEEPEST;
     for (int i = 0; i < FORK_HALVINGS; i++) {
         const Real middle = (low + high) / 2;
-        const int less = env_bears(all, fork, robot, middle) < load;
+        const int less = env_bears_deeper(all, fork, robot, middle) <= load;
         low = less ? middle : low;
         high = less ? high : middle;
     }
@@ -260,11 +306,12 @@ MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long rob
         env_set_down(all, fork, robot);
         return;
     }
-    const Real deeper = env_deeper(all, fork, robot);
-    if (deeper == 0) {
+    const Real load = env_rest(fork, robot)[0];
+    if (REAL_ABS(env_bears(all, fork, robot) - load) <= FORK_SAME * load) {
         return;
     }
-    env_shift_prints(fork, robot, deeper);
+    const Real deeper = env_deeper(all, fork, robot);
+    env_shift_prints(all, fork, robot, deeper);
     if (tile_lane() == 0) {
         env->robot.qpos[2] -= deeper;
     }

@@ -21,6 +21,7 @@ typedef struct {
         size_t bytes;
         size_t place; /* [B] in the block */
     } row[ENVS_ROWS_MAX];
+    size_t rest;      /* [B] in the block: what feet bear at rest, see batch_fork.h */
     BatchShape shape; /* of the feet's ground */
     BatchArrays ground;
 } EnvsFork;
