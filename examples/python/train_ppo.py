@@ -1,7 +1,6 @@
-"""PPO in plain PyTorch for walks on soft ground: everything that learns is in this file, and everything that walks is mild's. Tried on the
-CPU alone, where a minute gives no walk.
+"""PPO in plain PyTorch for walks on soft ground: everything that learns is in this file, and everything that walks is mild's.
 
-    python train_ppo.py                                # on a GPU where there is one (with mildground_cuda), else on the CPU
+    python train_ppo.py                                # on a GPU where there is one (with mildground_cuda), else on the CPU; 100 s of an H200
     python train_ppo.py --device cpu --envs 256 --steps 200000 --out runs/try       # a minute or two: a try, no walk
     mild eval --policy runs/ppo/policy.safetensors --ground rigid,foam45,sand_loose --speed 0.6      # and play, drive, export
 
@@ -197,7 +196,7 @@ def main():
     parser.add_argument("--device", default="cuda:0" if cuda else "cpu")
     parser.add_argument("--envs", type=int, default=4096 if cuda else 512)
     parser.add_argument("--rollout", type=int, default=24, help="policy steps between updates (default 24)")
-    parser.add_argument("--steps", type=float, default=40e6, help="policy steps of all robots together (default 40 million)")
+    parser.add_argument("--steps", type=float, default=50e6, help="policy steps of all robots together (default 50 million)")
     parser.add_argument("--config", default="configs/quick.ini", help="a file over configs/default.ini, or one of the package (default configs/quick.ini)")
     parser.add_argument("--robot", help="sa01 (default), g1, go1 or a folder; with its config")
     parser.add_argument("--ground", help="presets and files of soils, separated by commas (default: what the config draws)")
