@@ -205,6 +205,7 @@ def walk(given, numbers, log=print):
     robot, speed, device, believes = given.robot, given.speed, given.device, given.believes or given.ground
     arrays = Arrays(device)
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
+    keys.update({**numbers["jump"]["keys"], "task.jump": (given.jump, given.jump), "task.jump_start": given.jump} if given.jump else {})
     policy = Policy(arrays, given.policy, robot) if given.policy else None
     keys.update(policy.keys if policy else {})
     plant = Robots(arrays, given.trials, robot, {**keys, **ground_keys(given.ground)}, device, given.seed, given.threads)
@@ -212,7 +213,8 @@ def walk(given, numbers, log=print):
     tried = {**keys, **ground_keys(believes), **numbers["planner"].get("keys", {})}
     robots = Robots(arrays, given.trials * given.samples, robot, tried, device, given.seed, given.threads)
     gait = Gait(robot_ini(plant.envs.model), numbers["gait"], speed)
-    planner = Planner(arrays, plant, robots, gait, numbers["planner"], bool(given.believes), policy)
+    numbers = {**numbers["planner"], **(numbers["jump"]["planner"] if given.jump else {})}
+    planner = Planner(arrays, plant, robots, gait, numbers, bool(given.believes), policy)
     blocks = arrays.zeros(given.trials, plant.envs.block_bytes, dtype="uint8")
     start = np.array(arrays.host(plant.read()))
     yaw = yaw_of(np, start)
@@ -242,8 +244,8 @@ def walk(given, numbers, log=print):
                 flush=True)
     plant.close(), robots.close()
     walked = alive & (abs(moved[0] / given.seconds - speed) <= 0.2 * max(speed, 0.1))
-    trials = [{"upright": round(float(u), 2), "forward": float(m[0]), "side": float(m[1]), "turned": float(m[2]), "walked": bool(w)}
-              for u, m, w in zip(upright, moved.T, walked)]
+    trials = [{"upright": round(float(u), 2), "forward": float(m[0]), "side": float(m[1]), "turned": float(m[2]), "highest": float(h),
+               "walked": bool(w)} for u, m, w, h in zip(upright, moved.T, walked, np.max(path, axis=0)[:, 2])]
     return {"robot": robot, "ground": given.ground, "believes": given.believes, "speed": speed, "samples": given.samples,
             "walked": int(walked.sum()), "upright": int(alive.sum()), "trials": trials,
             "plan_ms": float(np.median(times[1:] or times))}, np.array(path)
@@ -270,7 +272,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default, words in (
             ("robot", "go1", "sa01, g1 or go1"), ("ground", "rigid", "rigid, or a preset (mild info grounds)"),
-            ("believes", "", "a ground without prints that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
+            ("believes", "", "a ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
+            ("jump", 0.0, "[m] rise of jumps, one after the other; 0: it walks"),
             ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
             ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
             ("policy", "", "a policy's file: plans are offsets from its actions, in the gait's place"),
@@ -280,8 +283,9 @@ def main():
     given = parser.parse_args()
     try:
         numbers = json.loads(pathlib.Path(given.numbers).read_text())
-        if given.robot not in numbers:
-            parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(numbers)}")
+        names = [name for name in numbers if not given.jump or "jump" in numbers[name]]
+        if given.robot not in names:
+            parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(names)}")
         result, path = walk(given, numbers[given.robot])
         print(json.dumps(result), flush=True)
         if given.path:
