@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Does seeing save falls? On the trials of `lab/paper/exam.py --parts slip_border` the robot slows before a border that it sees.
+"""Does seeing save falls? The trials of `lab/paper/exam.py --parts slip_border`, and longer courses, by a robot that slows before a border
+that it sees: where the ground ahead looks unlike that of its last step. `mild eval --led` asks it how fast to go.
 
-  lab/see/slow.py                       # eight walkers, 288 trials each, and courses without slip
-  lab/see/slow.py --seed 2 --walkers sees --threshold 0.5    # other trials
+  lab/see/slow.py                                             # all courses
+  lab/see/slow.py --seed 2 --courses exam --walkers blind,sees
 
-The robot compares what the ground ahead looks like with the ground of its last step. It is led by `mild eval --led`."""
+Walkers: blind; sees; alike: sees, but the floor looks like sand; knows the borders; random: slows as often, anywhere; steady: walks at the
+mean speed of the one that sees."""
 import argparse
 import concurrent.futures
 import json
@@ -21,16 +23,18 @@ sys.path[:0] = [str(ROOT / "lab/paper"), str(ROOT / "lab/see")]
 import exam  # noqa: E402
 import see  # noqa: E402
 
-FLOOR = (0.50, 0.40, 0.25)  # the look of `rigid`: darker than sand, of nearly its hue and texture
-LOOK = {"rigid": FLOOR, **{name: look for look, names in see.LOOKS for name in names}}
-COURSE = 3 * exam.PATCH  # [m]
-SLOW, SECONDS = 0.3, exam.transitions.START + COURSE / min(exam.SLOWLY)  # [m/s], [s] of a trial of any walker
-THRESHOLD, REACH, STEPS = 0.5, 0.8, 4  # looks that differ by more; [s] ahead in which it slows; steps beyond
-COLUMNS = round((see.FRONT + 4 - see.BACK) / see.PITCH)
+SAND = see.LOOKS[0][0]
+LOOK = {"rigid": (0.50, 0.40, 0.25), "alike": SAND, **{name: look for look, names in see.LOOKS for name in names}}  # rigid: a grey floor
+COURSES = {"exam": ("rigid+{0}+rigid", exam.SLOWLY, 24), "far": ("rigid+rigid+rigid+rigid+rigid+{0}+rigid", [0.6, 0.9], 28),
+           "wide": ("rigid+{0}+{0}+{0}+rigid", [0.6, 0.9], 28)}  # {0}: a sand; patches of 1.5 m, speeds, seconds
+PLAIN = {"one ground": ["rigid+rigid+rigid", "foam45", "grass", "rubber"], "harmless borders": [f"rigid+{soil}+rigid" for soil in ("foam45", "grass", "rubber")]}
+SLOW = 0.3  # [m/s]
+THRESHOLD, REACH, STEPS = 0.7, 0.8, 10  # by walks at constant speed without a robot; [s] ahead, and steps beyond: by trials of seed 2
+COLUMNS = round((see.FRONT + 10 - see.BACK) / see.PITCH)
 
 
-def look_along(names, rng):
-    """[columns][rows][3] (brightness, hue, texture) of a course, as strips of see.py have them: in shades, firmer parts, and grains."""
+def color_of(names, rng):
+    """[columns][rows][3] A course as see.py draws strips: a shade of each soil, firmer parts darker, grains, one light."""
     x = see.BACK + see.PITCH * (np.arange(COLUMNS) + 0.5)
     shade = {name: np.array(LOOK[name]) + rng.normal(0, see.SHADES, 3) for name in dict.fromkeys(names)}
     own = np.array([shade[name] for name in names])[np.clip((x // exam.PATCH).astype(int), 0, len(names) - 1)]
@@ -39,132 +43,138 @@ def look_along(names, rng):
     return np.maximum(own[:, None] + rng.normal(0, see.GRAIN, (COLUMNS, len(see.ACROSS), 3)), 0.02) * np.exp(rng.normal(0, see.GAIN))
 
 
-class Walker:
-    """Is told how fast to go, and says how fast it goes."""
-
-    def __init__(self, told, names, rng, given):
-        self.told, self.given, self.color, self.rng = told, given, look_along(names, rng), rng
-        self.sum, self.count = np.zeros((COLUMNS, 3)), np.zeros(COLUMNS)
-        self.delay, self.shots, self.next = rng.uniform(*see.DELAY), [], 0
-        self.down, self.step, self.border, self.left = np.ones(2, bool), None, np.inf, 0
-        self.passed, self.slow, self.alarms, self.at = None, 0, [], 0
-
-    def speed(self, time, feet):
-        """feet: [2][ankle 3, load]."""
-        base, self.at = feet[:, 0].mean(), time
-        for f in np.flatnonzero((feet[:, 3] > see.LOADED) & ~self.down):
-            self.step = feet[f, 0] + 0.03
-            self.left -= self.left > 0 and self.step > self.border
-        self.down = (feet[:, 3] > see.LOADED) | self.down & (feet[:, 3] > 0)
-        self.passed = time if self.passed is None and base > COURSE else self.passed
-        border = self.find(time, base, feet)
-        if border is not None:
-            self.alarms += [base] * (self.left == 0)
-            self.border, self.left = border, self.given.steps
-        self.slow += self.left > 0
-        return min(self.told, SLOW) if self.left else self.told
-
-    def find(self, time, base, feet):
-        """Blind."""
-
-    def reach(self, base):
-        return base + 0.1 + self.given.reach * self.told
-
-
 def column(x):
     return np.clip(((np.asarray(x) - see.BACK) / see.PITCH).astype(int), 0, COLUMNS - 1)
 
 
-def features(color):
-    bright, hue, texture = np.log(np.maximum(color, 0.01)).T
-    return np.stack([bright, hue - bright, texture - bright], -1) / 0.5
+class Walker:
+    """Is told how fast to go, and says how fast it goes. Which borders there are, only the judge knows."""
 
+    def __init__(self, kind, told, names, rng, given):
+        self.kind, self.told, self.given, self.rng, self.end = kind, told, given, rng, exam.PATCH * len(names)
+        self.true = [exam.PATCH * (n + 1) for n in range(len(names) - 1) if names[n] != names[n + 1]]
+        self.known = {"knows": self.true, "random": list(rng.uniform(0.1, self.end, len(self.true)))}.get(kind)
+        self.color, self.sum, self.count = color_of(names, rng), np.zeros((COLUMNS, 3)), np.zeros(COLUMNS)
+        self.delay, self.shots, self.next = rng.uniform(*see.DELAY), [], 0
+        self.down, self.step, self.border, self.left = np.ones(2, bool), 0, 0, 0
+        self.log = {"passed": None, "slow": 0, "alarms": 0, "met": [], "way": 0}
 
-class Sees(Walker):
+    def speed(self, time, feet):
+        """feet: [2][ankle 3, load]."""
+        base, steps = float(feet[:, 0].mean()), (feet[:, 3] > see.LOADED) & ~self.down
+        self.down = (feet[:, 3] > see.LOADED) | self.down & (feet[:, 3] > 0)
+        for f in np.flatnonzero(steps):
+            self.step = float(feet[f, 0])
+            self.left -= bool(self.left > 0 and self.step > self.border)
+        border, log = self.find(time, base, feet), self.log
+        if border is not None:
+            log["alarms"] += int(self.left == 0)
+            self.border, self.left = border, self.given.steps
+        log.update(passed=log["passed"] or (time if base > self.end else None), slow=log["slow"] + (self.left > 0), way=base)
+        log["met"] += [bool(self.left)] * (len(log["met"]) < len(self.true) and base > self.true[len(log["met"])])
+        return self.given.mean.get(self.told, self.told) if self.kind == "steady" else min(self.told, SLOW) if self.left else self.told
+
     def find(self, time, base, feet):
-        """[m] Where the ground ahead begins to look different from that of the last step; None: nowhere in reach."""
+        """[m] Where the ground in reach begins to look unlike that of the last step, by what has come of the camera; or None."""
+        reach = base + 0.3 + REACH * self.told
+        if self.known is not None:
+            return min((x for x in self.known if max(base, self.step) < x < reach), default=None)
+        if self.kind not in ("sees", "alike"):
+            return None
         if time >= self.next:
             self.next = time + see.SEEN - 1e-9
             dx, dy = base + see.AHEAD - feet[:, :1], see.ACROSS - (feet[:, 1:2] - feet[:, 1].mean())
-            hidden = ((dx > -0.1) & (dx < 0.22))[:, :, None] & (abs(dy) < 0.08)[:, None]
-            shown = (self.rng.random(hidden.shape[1:]) > see.DROP) & ~hidden.any(0)
+            hidden = (((dx > -0.1) & (dx < 0.22))[:, :, None] & (abs(dy) < 0.08)[:, None]).any(0)
+            shown = (self.rng.random(hidden.shape) > see.DROP) & ~hidden
             taken = self.color[column(base + see.AHEAD)] + self.rng.normal(0, see.GRAIN, (*shown.shape, 3))
             self.shots.append((time + self.delay, (taken * shown[..., None]).sum(1), shown.sum(1)))
-        new = False
-        while self.shots and self.shots[0][0] <= time:
-            _, color, count = self.shots.pop(0)
-            np.add.at(self.sum, column(base + see.AHEAD), color)  # where the base is when it comes
-            np.add.at(self.count, column(base + see.AHEAD), count)
-            new = True
-        if not new or self.step is None:
+        if not self.shots or self.shots[0][0] > time:
             return None
-        return self.different(base)
-
-    def different(self, base):
-        first, last = column((self.step - 0.15, self.reach(base)))
-        total, count = (np.lib.stride_tricks.sliding_window_view(array[first:min(last, column(base + 1.3)) + see.LONG], see.LONG, 0).sum(-1)
+        _, color, count = self.shots.pop(0)
+        at = column(base + see.AHEAD)  # where the base is when it comes
+        np.add.at(self.sum, at, color)
+        np.add.at(self.count, at, count)
+        first, last = column((self.step - see.PITCH * see.LONG / 2, min(reach, base + see.AHEAD[-1])))
+        total, count = (np.lib.stride_tricks.sliding_window_view(array[first:max(first, last) + see.LONG], see.LONG, 0).sum(-1)
                         for array in (self.sum, self.count))
-        seen = count > 20
-        if len(seen) < 2 or not seen[0]:
-            return None
-        look = features(total / np.maximum(count, 1)[:, None])
-        differs = np.flatnonzero(seen & (np.linalg.norm(look - look[0], axis=1) > self.given.threshold))
-        return see.BACK + see.PITCH * (first + differs[0] + see.LONG / 2) if len(differs) else None
-
-
-class Knows(Walker):
-    """Where the borders are."""
-    borders = exam.PATCH, 2 * exam.PATCH
-
-    def find(self, time, base, feet):
-        ahead = [x for x in self.borders if max(base, self.step or 0) < x < self.reach(base)]
-        return min(ahead, default=None)
-
-
-class Random(Knows):
-    """As many borders, but anywhere."""
-
-    def __init__(self, *given):
-        super().__init__(*given)
-        self.borders = self.rng.uniform(0.1, COURSE, 2)
-
-
-class Steady(Walker):
-    """At the mean speed of those who see."""
-
-    def speed(self, time, feet):
-        super().speed(time, feet)
-        return self.given.mean.get(self.told, self.told)
-
-
-WALKERS = {"blind": Walker, "sees": Sees, "knows": Knows, "random": Random, "steady": Steady}
+        bright, hue, texture = np.log(np.maximum(total, 1e-3) / np.maximum(count, 1)[:, None]).T / 0.5
+        look = np.stack([bright, hue - bright, texture - bright], 1)
+        unlike = np.flatnonzero((count > 20) & (np.linalg.norm(look - look[0], axis=1) > self.given.threshold)) if count[0] > 20 else []
+        return see.BACK + see.PITCH * (first + unlike[0] + see.LONG / 2) if len(unlike) else None
 
 
 def lead(kind, given, *arguments):
-    """What `mild eval` prints, where walkers lead; each trial of a row says when it passed the course, and how long it was slow."""
-    words = list(map(str, arguments))
-    grounds, told = words[words.index("--ground") + 1].split(","), [float(v) for word in words if word.startswith("--speed=") for v in word[8:].split(",")]
-    key = zlib.crc32(" ".join(words[words.index("--ground"):]).encode())
-    rows, walkers = [(ground, v) for ground in grounds for v in told], []
+    """What `mild eval` prints, where walkers lead; each trial also has the walker's log."""
+    words, grounds, speeds = list(map(str, arguments)), [], []
+    grounds, key = words[words.index("--ground") + 1].split(","), zlib.crc32(" ".join(words[words.index("--ground"):]).encode())
+    rows = [(ground.replace("rigid", "alike") if kind == "alike" else ground, float(v)) for ground in grounds
+            for word in words if word.startswith("--speed=") for v in word[8:].split(",")]
+    walkers = []
     with tempfile.TemporaryDirectory() as folder:
-        file = pathlib.Path(folder) / "rows.json"
-        words[words.index("--json") + 1] = str(file)
-        if "--seconds" in words:
-            words[words.index("--seconds") + 1] = f"{SECONDS:g}"
+        words[words.index("--json") + 1], words[words.index("--seconds") + 1] = f"{folder}/rows.json", str(given.seconds)
         with subprocess.Popen([*exam.measure.MILD, *words, "--led"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                              cwd=ROOT) as process:
-            while question := process.stdout.read(80):
-                trial, time, *feet = np.frombuffer(question)
+                              text=True, cwd=ROOT) as process:
+            for line in process.stdout:
+                trial, time, *feet = map(float, line.split())
                 if time < 0.015:
-                    if trial == 0:
-                        walkers.append([])
+                    walkers += [[]] * (trial == 0)
                     ground, v = rows[len(walkers) - 1]
-                    walkers[-1].append(WALKERS[kind](v, ground.split("+"), np.random.default_rng((key, len(walkers), int(trial))), given))
-                speed = walkers[-1][int(trial)].speed(time, np.reshape(feet, (2, 4)))
-                process.stdin.write(np.float64(speed).tobytes())
+                    rng = np.random.default_rng((key, len(walkers), int(trial)))
+                    walkers[-1] = [*walkers[-1], Walker(kind, v, ground.split("+"), rng, given)]
+                process.stdin.write(f"{walkers[-1][int(trial)].speed(time, np.reshape(feet, (2, 4))):.9g}\n")
                 process.stdin.flush()
-        report = json.loads(file.read_text())
+        report = json.loads(pathlib.Path(folder, "rows.json").read_text())
     for row, own in zip(report["rows"], walkers):
         for one, walker in zip(row["each"], own):
-            one.update(passed=walker.passed, slow=walker.slow / 100, alarms=walker.alarms)
+            one.update(walker.log)
     return json.dumps(report)
+
+
+def judge(kind, course, given):
+    """[(speed, trial)] of the exam's part on a course."""
+    form, speeds, given.seconds = COURSES[course]
+    exam.SLIDES["slip_border"] = "", [form.format(sand) for sand in exam.SANDS], speeds, ["--patch", exam.PATCH]
+    exam.mild = lambda *arguments: lead(kind, given, *arguments)
+    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+        rows = [row for rows in pool.map(lambda task: task(), exam.tasks(given.exam, "slip_border")) for row in rows]
+    return [(row["speed"], one) for row in rows for one in row["each"]]
+
+
+def wilson(k, n, z=1.96):
+    """[%] 95 % interval."""
+    middle, half = (k + z * z / 2) / (n + z * z), z / (n + z * z) * (k * (1 - k / n) + z * z / 4)**0.5
+    return f"{100 * max(middle - half, 0):.0f}-{100 * (middle + half):.0f}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, value in {"seed": 1, "jobs": 2, "courses": ",".join([*COURSES, "plain"]), "walkers": "blind,sees,alike,knows,random,steady",
+                        "threshold": THRESHOLD, "steps": STEPS}.items():
+        parser.add_argument(f"--{name}", type=type(value), default=value)
+    given = parser.parse_args()
+    given.exam, given.mean = exam.parse(["--out", "out", "--seed", str(given.seed)]), {}
+    for course in given.courses.split(","):
+        for kind in given.walkers.split(",") if course in COURSES else ():
+            trials, line = judge(kind, course, given), f"{course} {kind:7}"
+            for v in (*COURSES[course][1], None):
+                own = [one for speed, one in trials if v in (speed, None)]
+                fell, took = sum(one["end"] != "time" for one in own), np.mean([one["passed"] for one in own if one["passed"]])
+                met = [m for one in own for m in one["met"]]
+                line += f" | {v or 'all'}: {fell:3} of {len(own)} ({wilson(fell, len(own))} %), {took:5.2f} s, {sum(met)} of {len(met)} met"
+                if kind == "sees":
+                    given.mean[v] = exam.PATCH * (COURSES[course][0].count("+") + 1) / took
+            print(line, flush=True)
+    if "plain" in given.courses:
+        given.seconds = 12
+        for what, grounds in PLAIN.items():
+            for kind in ("blind", "sees"):
+                exam.mild = lambda *arguments, kind=kind: lead(kind, given, *arguments)
+                own = [(row["speed"], one) for v in (0.6, 0.9) for row in exam.walk(given.exam, grounds, [v], 10, ["--patch", exam.PATCH, "--seconds", 9])
+                       for one in row["each"]]
+                way = sum(one["way"] for _, one in own)
+                print(f"{what}, {kind}: {way:.0f} m, {sum(one['alarms'] for _, one in own)} alarms, " + ", ".join(
+                    f"{np.mean([one['way'] / one['seconds'] for speed, one in own if speed == v]):.3f} for {v} m/s" for v in (0.6, 0.9)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

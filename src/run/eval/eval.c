@@ -323,22 +323,24 @@ static void take_trial(void *context, int trial, int thread) {
     }
 }
 
-/* Of each trial that goes on: tells its number, the time [s], and of each foot the ankle 3 [m] and
- * the load [N], and hears the speed to command next [m/s], all as doubles of this machine. */
+/* Of each trial that goes on: tells in a line its number, the time [s], and of each foot the ankle 3
+ * [m] and the load [N], and hears in another the speed to command next [m/s]. */
 static MildStatus hear_speed(Trials *t, double time, MildError *error) {
     for (int i = 0; i < t->trials; i++) {
         const EnvsSample *last = t->host.sample + (size_t)(i + 1) * (size_t)t->samples - 1;
-        const size_t count = 2 + 4 * (size_t)robot_feet(t->run->robot);
-        double told[2 + 4 * ROBOT_FEET_MAX] = {i, time};
-        for (int f = 0; f < ROBOT_FEET_MAX; f++) {
-            memcpy(told + 2 + 4 * f, last->foot[f].position, sizeof last->foot[f].position);
-            told[5 + 4 * f] = last->foot[f].load;
+        char line[64];
+        if (is_over(t, i) || t->host.done[i]) {
+            continue;
         }
-        if (!is_over(t, i) && !t->host.done[i] &&
-            (fwrite(told, sizeof *told, count, stdout) != count || fflush(stdout) != 0 ||
-             fread(&t->heard[i], sizeof *t->heard, 1, stdin) != 1)) {
+        printf("%d %.2f", i, time);
+        for (int f = 0; f < last->feet; f++) {
+            const double *at = last->foot[f].position;
+            printf(" %.6g %.6g %.6g %.6g", at[0], at[1], at[2], last->foot[f].load);
+        }
+        if (printf("\n") < 0 || fflush(stdout) != 0 || !fgets(line, sizeof line, stdin)) {
             return mild_fail(error, MILD_ERROR_IO, "--led: nobody says how fast to go");
         }
+        t->heard[i] = strtod(line, NULL);
     }
     return MILD_OK;
 }
