@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "control/speed_hold.h"
 #include "device/device.h"
 #include "env/envs.h"
@@ -323,12 +324,12 @@ static void take_trial(void *context, int trial, int thread) {
     }
 }
 
-/* Of each trial that goes on: tells in a line its number, the time [s], and of each foot the ankle 3
- * [m] and the load [N], and hears in another the speed to command next [m/s]. */
+/* Of each trial that goes on: tells in a line its number, the time [s], and of each foot the ankle
+ * 3 [m] and the load [N], and hears in another the speed to command next [m/s]. */
 static MildStatus hear_speed(Trials *t, double time, MildError *error) {
     for (int i = 0; i < t->trials; i++) {
         const EnvsSample *last = t->host.sample + (size_t)(i + 1) * (size_t)t->samples - 1;
-        char line[64];
+        char line[64] = "";
         if (is_over(t, i) || t->host.done[i]) {
             continue;
         }
@@ -337,10 +338,14 @@ static MildStatus hear_speed(Trials *t, double time, MildError *error) {
             const double *at = last->foot[f].position;
             printf(" %.6g %.6g %.6g %.6g", at[0], at[1], at[2], last->foot[f].load);
         }
-        if (printf("\n") < 0 || fflush(stdout) != 0 || !fgets(line, sizeof line, stdin)) {
+        printf("\n");
+        if (fflush(stdout) != 0 || !fgets(line, sizeof line, stdin)) {
             return mild_fail(error, MILD_ERROR_IO, "--led: nobody says how fast to go");
         }
-        t->heard[i] = strtod(line, NULL);
+        line[strcspn(line, "\n")] = 0;
+        if (!text_double(line, &t->heard[i])) {
+            return mild_fail(error, MILD_ERROR_IO, "--led: '%s' is no speed", line);
+        }
     }
     return MILD_OK;
 }
