@@ -9,6 +9,7 @@ Walkers: blind; sees; alike: sees, but the floor looks like sand; knows the bord
 mean speed of the one that sees."""
 import argparse
 import concurrent.futures
+import itertools
 import json
 import pathlib
 import subprocess
@@ -27,7 +28,8 @@ SAND = see.LOOKS[0][0]
 LOOK = {"rigid": (0.50, 0.40, 0.25), "alike": SAND, **{name: look for look, names in see.LOOKS for name in names}}  # rigid: a grey floor
 COURSES = {"exam": ("rigid+{0}+rigid", exam.SLOWLY, 24), "far": ("rigid+rigid+rigid+rigid+rigid+{0}+rigid", [0.6, 0.9], 28),
            "wide": ("rigid+{0}+{0}+{0}+rigid", [0.6, 0.9], 28)}  # {0}: a sand; patches of 1.5 m, speeds, seconds
-PLAIN = {"one ground": ["rigid+rigid+rigid", "foam45", "grass", "rubber"], "harmless borders": [f"rigid+{soil}+rigid" for soil in ("foam45", "grass", "rubber")]}
+PLAIN = {"one ground": ["rigid+rigid+rigid", "foam45", "grass", "rubber"],
+         "harmless borders": [f"rigid+{soil}+rigid" for soil in ("foam45", "grass", "rubber")]}
 SLOW = 0.3  # [m/s]
 THRESHOLD, REACH, STEPS = 0.7, 0.8, 10  # by walks at constant speed without a robot; [s] ahead, and steps beyond: by trials of seed 2
 COLUMNS = round((see.FRONT + 10 - see.BACK) / see.PITCH)
@@ -44,7 +46,7 @@ def color_of(names, rng):
 
 
 def column(x):
-    return np.clip(((np.asarray(x) - see.BACK) / see.PITCH).astype(int), 0, COLUMNS - 1)
+    return np.clip(((np.asarray(x) - see.BACK) / see.PITCH).astype(int), 0, COLUMNS - see.LONG)
 
 
 class Walker:
@@ -72,7 +74,7 @@ class Walker:
             self.border, self.left = border, self.given.steps
         log.update(passed=log["passed"] or (time if base > self.end else None), slow=log["slow"] + (self.left > 0), way=base)
         log["met"] += [bool(self.left)] * (len(log["met"]) < len(self.true) and base > self.true[len(log["met"])])
-        return self.given.mean.get(self.told, self.told) if self.kind == "steady" else min(self.told, SLOW) if self.left else self.told
+        return self.given.mean[self.told] if self.kind == "steady" else min(self.told, SLOW) if self.left else self.told
 
     def find(self, time, base, feet):
         """[m] Where the ground in reach begins to look unlike that of the last step, by what has come of the camera; or None."""
@@ -105,15 +107,14 @@ class Walker:
 
 def lead(kind, given, *arguments):
     """What `mild eval` prints, where walkers lead; each trial also has the walker's log."""
-    words, grounds, speeds = list(map(str, arguments)), [], []
+    words, walkers = list(map(str, arguments)), []
     grounds, key = words[words.index("--ground") + 1].split(","), zlib.crc32(" ".join(words[words.index("--ground"):]).encode())
     rows = [(ground.replace("rigid", "alike") if kind == "alike" else ground, float(v)) for ground in grounds
             for word in words if word.startswith("--speed=") for v in word[8:].split(",")]
-    walkers = []
     with tempfile.TemporaryDirectory() as folder:
         words[words.index("--json") + 1], words[words.index("--seconds") + 1] = f"{folder}/rows.json", str(given.seconds)
-        with subprocess.Popen([*exam.measure.MILD, *words, "--led"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                              text=True, cwd=ROOT) as process:
+        with subprocess.Popen([*exam.measure.MILD, *words, "--led"], cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.DEVNULL) as process:
             for line in process.stdout:
                 trial, time, *feet = map(float, line.split())
                 if time < 0.015:
@@ -152,6 +153,8 @@ def main():
                         "threshold": THRESHOLD, "steps": STEPS}.items():
         parser.add_argument(f"--{name}", type=type(value), default=value)
     given = parser.parse_args()
+    if "steady" in given.walkers and "sees" not in given.walkers.split("steady")[0]:
+        parser.error("--walkers: steady has the speed of sees, which comes before it")
     given.exam, given.mean = exam.parse(["--out", "out", "--seed", str(given.seed)]), {}
     for course in given.courses.split(","):
         for kind in given.walkers.split(",") if course in COURSES else ():
@@ -166,14 +169,13 @@ def main():
             print(line, flush=True)
     if "plain" in given.courses:
         given.seconds = 12
-        for what, grounds in PLAIN.items():
-            for kind in ("blind", "sees"):
-                exam.mild = lambda *arguments, kind=kind: lead(kind, given, *arguments)
-                own = [(row["speed"], one) for v in (0.6, 0.9) for row in exam.walk(given.exam, grounds, [v], 10, ["--patch", exam.PATCH, "--seconds", 9])
-                       for one in row["each"]]
-                way = sum(one["way"] for _, one in own)
-                print(f"{what}, {kind}: {way:.0f} m, {sum(one['alarms'] for _, one in own)} alarms, " + ", ".join(
-                    f"{np.mean([one['way'] / one['seconds'] for speed, one in own if speed == v]):.3f} for {v} m/s" for v in (0.6, 0.9)), flush=True)
+        for (what, grounds), kind in itertools.product(PLAIN.items(), ("blind", "sees")):
+            exam.mild = lambda *arguments, kind=kind: lead(kind, given, *arguments)
+            for v in (0.6, 0.9):
+                rows = exam.walk(given.exam, grounds, [v], 10, ["--patch", exam.PATCH, "--seconds", given.seconds])
+                own = [one for row in rows for one in row["each"]]
+                way, time, slow = (sum(one[key] for one in own) for key in ("way", "seconds", "alarms"))
+                print(f"{what}, {kind}, told {v} m/s: {way / time:.3f} m/s, {slow} times slow in {way:.0f} m", flush=True)
 
 
 if __name__ == "__main__":
