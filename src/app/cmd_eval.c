@@ -300,7 +300,7 @@ static void print_header(const Eval *e, FILE *table) {
 
 static MildStatus evaluate_table(Eval *e, MildError *error) {
     const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track, e->feet};
-    int taken = 0; /* bool: standard output */
+    int taken = e->eval.led; /* bool: standard output */
     for (int i = 0; i < (int)(sizeof outputs / sizeof *outputs); i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
@@ -378,6 +378,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
                           : e->track          ? "--track"
                           : e->feet           ? "--feet"
                           : e->program        ? "--program"
+                          : e->eval.led       ? "--led"
                           : e->eval.push != 0 ? "--push"
                                               : NULL;
     if (device < -1) {
@@ -566,6 +567,9 @@ int cmd_eval(int argc, char **argv) {
         {"program", CLI_TEXT, &e->program, 0, 0, "COMMAND",
          "a program that computes the soft ground in the place of the model, asked in every "
          "physics step; one runs for each trial (lab/grains/README.md)"},
+        {"led", CLI_FLAG, &e->eval.led, 0, 0, NULL,
+         "after every policy step tell each trial's feet on standard output, and hear the speed to "
+         "command on standard input (src/run/eval/eval.c)"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

@@ -138,6 +138,15 @@ awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,foot,time_s,ankle_x_m/ || NF != 21
     fail "rows of feet.csv: $(wc -l <feet.csv)"
 bad "--feet" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --feet feet.csv
 bad "--program" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --program true
+bad "--led" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --led
+expect 2 '--led: nobody' "$mild" eval --ground grass --trials 1 --seconds 0.1 --led
+expect 2 "--led: 'fast'" bash -c "echo fast | '$mild' eval --ground grass --trials 1 --seconds 0.1 --led"
+for speed in 0.6 0.3; do
+    "$mild" eval --ground grass --trials 2 --seconds 1 --led --json led.json < <(yes $speed 2>/dev/null) >led.txt 2>/dev/null || fail "--led"
+    [ "$(grep -v randomize led.json)" = "$(walk)" ] && led=as || led=other
+    [[ "$led $speed" =~ ^(as 0.6|other 0.3)$ ]] || fail "--led at $speed is $led"
+    [ "$(wc -lw <led.txt | tr -s ' ')" = " 198 1980" ] || fail "--led tells $(wc -lw <led.txt)"
+done
 torque() { "$mild" eval --ground grass --trials 2 --seconds 0.3 "$@" --json - 2>/dev/null | sed -n 's/.*"torque_max": *//p'; }
 whole=$(torque)
 for part in z modulation estimates history; do

@@ -5,7 +5,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "base/text.h"
 #include "control/speed_hold.h"
 #include "device/device.h"
 #include "env/envs.h"
@@ -88,6 +90,7 @@ typedef struct {
     Results device, host;
     float *action;   /* [trials][joints] */
     double *command; /* [trials][TASK_COMMANDS] */
+    double *heard;   /* [trials] [m/s] with EvalDef.led */
     SpeedHoldDef speed_hold;
     SpeedHold *hold;                   /* [trials] */
     Measure *measure;                  /* [trials] */
@@ -213,11 +216,12 @@ static MildStatus open_arrays(Trials *t, MildError *error) {
     t->block = calloc(1, t->bytes);
     t->action = calloc(trials * actions, sizeof *t->action);
     t->command = calloc(trials, TASK_COMMANDS * sizeof *t->command);
+    t->heard = calloc(trials, sizeof *t->heard);
     t->hold = calloc(trials, sizeof *t->hold);
     t->measure = calloc(trials, sizeof *t->measure);
     t->end = calloc(trials, 1);
     t->env = t->run->batch ? NULL : calloc(trials, sizeof *t->env);
-    if (!t->block || !t->action || !t->command || !t->hold || !t->measure || !t->end ||
+    if (!t->block || !t->action || !t->command || !t->heard || !t->hold || !t->measure || !t->end ||
         (!t->env && !t->run->batch)) {
         return fail_memory(t, error);
     }
@@ -246,6 +250,7 @@ static void close_trials(Trials *t) {
     free(t->block);
     free(t->action);
     free(t->command);
+    free(t->heard);
     free(t->hold);
     measure_free(t->measure, t->trials);
     free(t->end);
@@ -310,12 +315,39 @@ static void take_trial(void *context, int trial, int thread) {
     }
     take_smooth(t, trial, at - 1);
     command = t->command + TASK_COMMANDS * (size_t)trial;
-    direct(eval, speed_of(t, trial), t->measure[trial].time, (at - 1)->quaternion, command);
+    direct(eval, eval->led ? t->heard[trial] : speed_of(t, trial), t->measure[trial].time,
+           (at - 1)->quaternion, command);
     speed_hold(&t->hold[trial], &t->speed_hold, newest_frame(t, trial),
                controller_estimates(t->run->controller, trial), command);
     if (t->env) {
         push_trial(t->env[trial], eval->push);
     }
+}
+
+/* Of each trial that goes on: tells in a line its number, the time [s], and of each foot the ankle
+ * 3 [m] and the load [N], and hears in another the speed to command next [m/s]. */
+static MildStatus hear_speed(Trials *t, double time, MildError *error) {
+    for (int i = 0; i < t->trials; i++) {
+        const EnvsSample *last = t->host.sample + (size_t)(i + 1) * (size_t)t->samples - 1;
+        char line[64] = "";
+        if (is_over(t, i) || t->host.done[i]) {
+            continue;
+        }
+        printf("%d %.2f", i, time);
+        for (int f = 0; f < last->feet; f++) {
+            const double *at = last->foot[f].position;
+            printf(" %.6g %.6g %.6g %.6g", at[0], at[1], at[2], last->foot[f].load);
+        }
+        printf("\n");
+        if (fflush(stdout) != 0 || !fgets(line, sizeof line, stdin)) {
+            return mild_fail(error, MILD_ERROR_IO, "--led: nobody says how fast to go");
+        }
+        line[strcspn(line, "\n")] = 0;
+        if (!text_double(line, &t->heard[i])) {
+            return mild_fail(error, MILD_ERROR_IO, "--led: '%s' is no speed", line);
+        }
+    }
+    return MILD_OK;
 }
 
 /* Shows to who watches what the controller has decided. */
@@ -370,6 +402,9 @@ static MildStatus step(Trials *t, int step, MildError *error) {
     status = status == MILD_OK ? envs_step(t->envs, &call, NULL, error) : status;
     if (status == MILD_OK) {
         status = device_copy(run->device, t->block, t->device_block, t->bytes, error);
+    }
+    if (status == MILD_OK && run->eval.led) {
+        status = hear_speed(t, (step + 1) * TASK_PERIOD, error);
     }
     if (status == MILD_OK) {
         pool_run(run->pool, t->trials, take_trial, t);

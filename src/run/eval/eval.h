@@ -41,6 +41,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     int start;      /* a TaskStart: that of EvalRun.task */
     FILE *stances;  /* a row of CSV for each stance of each trial; NULL: none */
+    int led;        /* bool: how fast to go is heard on standard input, see hear_speed; by MuJoCo */
     /* by MuJoCo, of one row; NULL: none */
     const EvalCallback *callback;
     FILE *actions; /* a row of CSV for each decision, see eval/actions.h */
