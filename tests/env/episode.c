@@ -18,7 +18,8 @@ Episode episode_of(const Envs *envs, int i) {
                        .rigid_time = from->variation.rigid_time,
                        .map = {map[0], map[1]}};
     for (int f = 0; f < from->shape.feet; f++) {
-        episode.load += env_reading(env_robot_at(all, i))->foot[f].force[2];
+        episode.load +=
+            all->contact.velocity[6 * (i * from->shape.feet + f) + 2]; /* now wrenches */
     }
     memcpy(episode.ground, from->ground, sizeof episode.ground);
     for (int k = 0; k < 3; k++) {

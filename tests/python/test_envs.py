@@ -224,7 +224,7 @@ class Plan(unittest.TestCase):
     def test_walks(self):
         """A plan of few samples keeps the Go1 up, and goes forward; the policy of another robot is refused."""
         given = argparse.Namespace(robot="go1", ground="foam45", believes="rigid", speed=0.5, seconds=1.5, samples=6, trials=2, seed=1, device="cpu",
-                                   threads=1, policy="")
+                                   threads=1, policy="", jump=0)
         numbers = json.loads((ROOT / "examples/python/plan/plan.json").read_text())["go1"]
         result, path = plan.walk(given, numbers, log=None)
         self.assertEqual((result["upright"], path.shape), (2, (150, 2, 19)))
@@ -232,6 +232,15 @@ class Plan(unittest.TestCase):
         given.policy = str(ROOT / "policies/g1.safetensors")
         with self.assertRaisesRegex(ValueError, "g1.safetensors is not a policy of go1"):
             plan.walk(given, numbers, log=None)
+
+    def test_jumps(self):
+        """A plan of few samples throws the Go1 up as high as it is told."""
+        given = argparse.Namespace(robot="go1", ground="rigid", believes="", speed=0, seconds=0.5, samples=24, trials=2, seed=1, device="cpu",
+                                   threads=1, policy="", jump=0.15)
+        result, path = plan.walk(given, json.loads((ROOT / "examples/python/plan/plan.json").read_text())["go1"], log=None)
+        for trial, z in zip(result["trials"], path[:, :, 2].T):
+            self.assertEqual((trial["upright"], trial["highest"]), (0.5, z.max()))
+            self.assertAlmostEqual(trial["highest"], 0.32 + 0.15, delta=0.05)
 
     def test_film(self):
         """Each step of a path is shown at its time, then the film ends."""
