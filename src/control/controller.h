@@ -5,6 +5,7 @@
 #define MILD_CONTROLLER_H
 
 #include "base/pool.h"
+#include "control/speed_hold.h"
 #include "env/task/task.h"
 
 typedef struct {
@@ -77,6 +78,8 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
                               Controller *controller, MildError *error);
 /* [estimates] of a row's last action, or NULL. */
 const float *controller_estimates(const Controller *controller, int row);
+/* Off for a controller that estimates nothing. */
+SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller);
 void controller_destroy(Controller *controller);
 
 #endif

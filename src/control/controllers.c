@@ -82,6 +82,13 @@ const float *controller_estimates(const Controller *controller, int row) {
     return controller->estimates ? controller->estimates(controller->self, row) : NULL;
 }
 
+SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
+    return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
+                          .scale = task->velocity_scale,
+                          .most = task->speed_hold_most,
+                          .clock = task_shape(task, robot).observation - 2};
+}
+
 void controller_destroy(Controller *controller) {
     if (controller->self) {
         controller->destroy(controller->self);

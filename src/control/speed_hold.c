@@ -1,7 +1,8 @@
 #include "control/speed_hold.h"
 
 #include <math.h>
-#include <string.h>
+
+#include "env/task/state.h"
 
 #define ERROR_MAX 0.5   /* [-] of the speed of one cycle */
 #define SPEED_MIN 0.1   /* [m/s, rad/s] of a command whose ratio can be learned */
@@ -14,13 +15,6 @@
 static const double ratio_max[3] = {0.2, 0.2, 0.4}; /* [-] */
 /* The numbers of a command that are a part's: from the first to before the next part's. */
 static const int first_of[SPEED_HOLD_PARTS + 1] = {TASK_FORWARD, TASK_TURN, TASK_TURN + 1};
-
-SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller) {
-    return (SpeedHoldDef){.gain = controller->estimates ? task->speed_hold : 0,
-                          .scale = task->velocity_scale,
-                          .most = task->speed_hold_most,
-                          .clock = task_shape(task, robot).observation - 2};
-}
 
 static void learn(SpeedHold *hold, int part, double gain) {
     const double n = ++hold->cycles[part], share = fmax(gain, 1 / n), weight = n * n / (n * n + 1);
@@ -82,7 +76,6 @@ void speed_hold(SpeedHold *hold, const SpeedHoldDef *def, const float *frame,
     const double sine = (double)frame[def->clock], cosine = (double)frame[def->clock + 1];
     if (sine == 0 && cosine == 0) { /* it stands */
         *hold = (SpeedHold){.settling = {SETTLING, SETTLING}};
-        memcpy(hold->wanted, command, sizeof hold->wanted);
         return;
     }
     hold->late = fmax(hold->late - TASK_PERIOD, 0);

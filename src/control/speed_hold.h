@@ -12,8 +12,6 @@
 #ifndef CONTROL_SPEED_HOLD_H
 #define CONTROL_SPEED_HOLD_H
 
-#include "control/controller.h"
-
 /* Constant. */
 typedef struct {
     double gain;  /* [-] TaskDef.speed_hold; 0: off */
@@ -40,8 +38,6 @@ typedef struct {
     double way[3];             /* [m/s, m/s, rad/s] sum of what is measured */
 } SpeedHold;
 
-/* Off for a controller that estimates nothing. */
-SpeedHoldDef speed_hold_def(const TaskDef *task, const Robot *robot, const Controller *controller);
 /* After each policy step. frame: [observation] the newest one, as the policy sees it. estimates: of
  * controller_estimates. Changes command from what is wanted to what to command. Allocates nothing;
  * may run at the same time for different SpeedHold. */
