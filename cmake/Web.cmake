@@ -2,12 +2,12 @@
 # and the core for this machine, which the tests step.
 add_executable(web_pack ${CMAKE_SOURCE_DIR}/web/pack.c)
 target_link_libraries(web_pack PRIVATE layer_config layer_belief mild_options)
-target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR})
+target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/layers/control)
 add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c
-  ${CMAKE_SOURCE_DIR}/src/identify/belief/belief.c)
+  ${CMAKE_SOURCE_DIR}/src/identify/belief/belief.c ${CMAKE_SOURCE_DIR}/src/control/speed_hold.c)
 target_link_libraries(web_core PUBLIC layer_env layer_soil PRIVATE mild_options)
 target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn
-  ${CMAKE_BINARY_DIR}/layers/view PUBLIC ${CMAKE_BINARY_DIR}/layers/belief)
+  ${CMAKE_BINARY_DIR}/layers/view PUBLIC ${CMAKE_BINARY_DIR}/layers/belief ${CMAKE_BINARY_DIR}/layers/control)
 # as env/batch_host.c; options of the file, which come behind those of mild_options
 set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c ${CMAKE_SOURCE_DIR}/web/window.c PROPERTIES COMPILE_OPTIONS
   "$<$<NOT:${mild_sanitized}>:-O2>;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")

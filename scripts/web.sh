@@ -15,6 +15,6 @@ exports=web_open,web_start,web_soil,web_text,web_again,web_change,web_step,web_v
 emcc -O3 -msimd128 -std=c17 -ffp-contract=off -fno-math-errno -fno-trapping-math -fopenmp-simd -D_POSIX_C_SOURCE=200809L \
     -Wno-pass-failed -I. -Isrc -Iinclude --no-entry -sSTANDALONE_WASM=1 -sINITIAL_MEMORY=67108864 -sTOTAL_STACK=1048576 \
     -sEXPORTED_FUNCTIONS="_${exports//,/,_}" \
-    web/core.c web/window.c src/identify/belief/belief.c src/ground/{law,terrain,sole,step,models}/*.c src/ground/soil/soil.c src/base/error.c src/base/field.c src/base/text.c -o "$to/mild.wasm"
+    web/core.c web/window.c src/identify/belief/belief.c src/control/speed_hold.c src/ground/{law,terrain,sole,step,models}/*.c src/ground/soil/soil.c src/base/error.c src/base/field.c src/base/text.c -o "$to/mild.wasm"
 cp "$build"/generated/web/*.bin web/index.html web/style.css web/mild.js web/draw.js "$to"
 du -cb "$to"/* | tail -1 | awk '{ printf "web: %s, %.2f MB\n", "'"$to"'", $1 / 1e6 }'

@@ -29,6 +29,8 @@ static struct {
     /* the policy */
     float *weight;
     float *wide[2]; /* [widest layer] */
+    float estimate[HEADS_MAX];
+    SpeedHold hold;
     /* the batch engine */
     EnvsTask task;
     EnvsGround drawn; /* the only ground to draw */
@@ -143,6 +145,7 @@ void web_act(const float *history, float *action) {
     weight = apply(&policy->modulation, weight, input, theta);
     memcpy(input, frame, (size_t)observation * sizeof *input);
     memcpy(input + observation, head, (size_t)estimates * sizeof *input);
+    memcpy(web.estimate, head, (size_t)estimates * sizeof *head);
     for (int j = 0; j < policy->latent; j++) {
         const int at = policy->per_dimension ? j : 0;
         const int shift = policy->per_dimension ? policy->latent + j : 1;
@@ -187,12 +190,6 @@ static void show_foot(int f) {
                                           (foot->pressure_center[i] - web.input.position[f][i]));
         }
     }
-}
-
-static void show_ground(void) {
-    const Real *base = web.env_scratch->work.base;
-    web.scene.ground = web.ground;
-    window_show(&web.scene, (double)base[0], (double)base[1], web.trial.rigid, &web.view);
 }
 
 /* ---- physics ---- */
@@ -370,20 +367,22 @@ int web_move(const float *action, const float command[TASK_COMMANDS]) {
 }
 
 void web_show(void) {
+    const Real *base = web.env_scratch->work.base;
     show_links();
     for (int f = 0; f < web.feet; f++) {
         show_foot(f);
     }
-    show_ground();
+    web.scene.ground = web.ground;
+    window_show(&web.scene, (double)base[0], (double)base[1], web.trial.rigid, &web.view);
 }
 
-/* The newest frame of the history, and what it says about the ground. */
-static void look_at_ground(void) {
+/* The newest frame of the history; and what it says about the ground. */
+static const float *look_at_ground(void) {
     const WebModel *file = web.file;
     const float *frame = web.history + file->shape.history - file->shape.observation;
     WebView *view = &web.view;
     if (!file->knows || !(belief_step(&web.belief, &file->belief, frame) & BELIEF_FOOTSTEP)) {
-        return;
+        return frame;
     }
     view->footsteps = (float)web.belief.footsteps;
     view->alarms = (float)web.belief.alarms;
@@ -393,13 +392,16 @@ static void look_at_ground(void) {
                                  belief_quantile(&web.belief, &file->belief,
                                                  (BeliefParameter)(i / 3), share[i % 3]));
     }
+    return frame;
 }
 
 int web_step(float vx, float vy, float wz, float rise) {
-    const float command[TASK_COMMANDS] = {vx, vy, wz, rise};
+    const float *frame = look_at_ground();
+    double held[] = {(double)vx, (double)vy, (double)wz};
     float action[ROBOT_JOINTS_MAX];
-    look_at_ground();
     web_act(web.history, action);
+    speed_hold(&web.hold, &web.file->hold, frame, web.estimate, held);
+    const float command[TASK_COMMANDS] = {(float)held[0], (float)held[1], (float)held[2], rise};
     const int end = web_move(action, command);
     web_show();
     return end;
@@ -433,6 +435,7 @@ static const MildMaterial *material_at(double x, double y) {
 static void stand_up(double x, double y, double yaw) {
     TaskEnv *env = web_env();
     belief_reset(&web.belief);
+    web.hold = (SpeedHold){0};
     web.view.footsteps = web.view.alarms = 0;
     const double load = web.task.robot.total_mass * web.file->gravity / web.feet;
     memset(env->command, 0, sizeof env->command);
@@ -454,7 +457,7 @@ static void stand_up(double x, double y, double yaw) {
 void web_again(void) {
     const float *at = web_env()->robot.qpos;
     stand_up((double)at[0], (double)at[1], (double)web.view.yaw);
-    show_ground();
+    web_show();
 }
 
 static MildMapDef map_of(int ground, int relief) {

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "control/speed_hold.h"
 #include "env/task/state.h"
 #include "identify/belief/belief.h"
 #include "learn/policy_def.h"
@@ -86,6 +87,7 @@ typedef struct {
     double shell_spacing; /* [m] */
     int32_t shells;       /* that stand on soft ground */
     WebShell shell[ROBOT_SHELLS_MAX];
+    SpeedHoldDef hold;
     WebPolicy policy;
     int32_t knows; /* bool: the robot knows its ground, by `belief` */
     BeliefNet belief;

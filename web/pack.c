@@ -250,6 +250,10 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
     if (shape.scan > 0) {
         return stop("the policy sees the ground (task.scan), which the page does not show it");
     }
+    file.hold = (SpeedHoldDef){.gain = policy_def(policy)->estimates ? task->speed_hold : 0,
+                               .scale = task->velocity_scale,
+                               .most = task->speed_hold_most,
+                               .clock = shape.observation - 2};
     robot_set_shells(robot, task->shells_stand);
     MildStatus status = pack_model(robot, task, &file, error);
     if (status == MILD_OK) {
