@@ -114,7 +114,7 @@ def lead(kind, given, *arguments):
     with tempfile.TemporaryDirectory() as folder:
         words[words.index("--json") + 1], words[words.index("--seconds") + 1] = f"{folder}/rows.json", str(given.seconds)
         with subprocess.Popen([*exam.measure.MILD, *words, "--led"], cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL) as process:
+                              stderr=subprocess.PIPE) as process:
             for line in process.stdout:
                 trial, time, *feet = map(float, line.split())
                 if time < 0.015:
@@ -124,6 +124,9 @@ def lead(kind, given, *arguments):
                     walkers[-1] = [*walkers[-1], Walker(kind, v, ground.split("+"), rng, given)]
                 process.stdin.write(f"{walkers[-1][int(trial)].speed(time, np.reshape(feet, (2, 4))):.9g}\n")
                 process.stdin.flush()
+            told = process.stderr.read()
+        if process.returncode:
+            sys.exit(f"slow: {told.strip()}")
         report = json.loads(pathlib.Path(folder, "rows.json").read_text())
     for row, own in zip(report["rows"], walkers):
         for one, walker in zip(row["each"], own):

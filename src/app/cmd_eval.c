@@ -300,9 +300,13 @@ static void print_header(const Eval *e, FILE *table) {
 
 static MildStatus evaluate_table(Eval *e, MildError *error) {
     const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track, e->feet};
-    int taken = e->eval.led; /* bool: standard output */
+    int taken = e->eval.led; /* how many want standard output */
     for (int i = 0; i < (int)(sizeof outputs / sizeof *outputs); i++) {
-        taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
+        taken += outputs[i] && strcmp(outputs[i], "-") == 0;
+    }
+    if (e->eval.led && taken > 1) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--led talks on standard output: give the other output a file's name");
     }
     FILE *table = taken ? stderr : stdout;
     const int batch = train_is_batch(&e->context.train);

@@ -1,6 +1,7 @@
 #include "control/speed_hold.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "env/task/state.h"
 
@@ -10,6 +11,7 @@
 #define TURNING_MAX 0.4 /* [rad/s] of a command in a cycle that r of the speeds can learn from */
 #define SETTLING 2      /* cycles after that */
 #define ACCELERATION 1  /* [m/s^2] with which a robot comes to another speed, at least */
+#define LATE_MAX 5      /* [s] a command that never rests */
 #define YAW_RATE 2      /* place in a frame [rad/s] */
 
 static const double ratio_max[3] = {0.2, 0.2, 0.4}; /* [-] */
@@ -53,6 +55,7 @@ static void begin_anew(SpeedHold *hold, int part, const double command[3]) {
         hold->late += hypot(command[TASK_FORWARD] - hold->wanted[TASK_FORWARD],
                             command[TASK_LEFT] - hold->wanted[TASK_LEFT]) /
                       ACCELERATION;
+        hold->late = fmin(hold->late, LATE_MAX);
     }
     for (int i = first_of[part]; i < first_of[part + 1]; i++) {
         hold->wanted[i] = command[i];

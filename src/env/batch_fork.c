@@ -98,6 +98,11 @@ MildStatus batch_fork(Envs *envs, const void *blocks, int count, size_t stride, 
                          "fork: a block of %zu bytes, but these environments' has %zu", stride,
                          least);
     }
+    if (own_ground && b->ground->shape.map) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "fork: own_ground is for level ground of one material; "
+                         "randomize.patch_share and terrain.kind ask for another");
+    }
     if ((uintptr_t)blocks % BLOCK_ALIGN || stride % BLOCK_ALIGN) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "fork: blocks must begin at multiples of %d",
                          BLOCK_ALIGN);

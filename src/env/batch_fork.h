@@ -1,12 +1,13 @@
 /* Saving an environment of the batch engine and putting it into others: envs_save, envs_fork.
  *
- * On another soft ground, own_ground, an element keeps its place on its unloading line, s: the
- * share of the force that it bore at the greatest depth a. On ground that gives back r of a, at the
- * depth u,
+ * On another soft ground, own_ground, a robot takes its prints along. An element at the depth u that
+ * has been at a bears the share s of what it would bear at a. It keeps s, so that on ground that
+ * gives back r of a
  *
- *     a = u + (1 - s) max(r a, ELEMENT_ELASTIC)
- * The robot is moved to the height at which the feet bear at rest what they bore in the block. On
- * the same ground nothing moves. */
+ *     a = u + (1 - s) max(r a, ELEMENT_ELASTIC),   a <= FORK_PRINT u
+ * and the robot is moved up or down until the feet bear at rest what they bore in the block. Where
+ * they bear that already nothing moves: the same ground is as if it were copied. A robot without
+ * load is not moved; its elements bear nothing. */
 #ifndef ENVS_BATCH_FORK_H
 #define ENVS_BATCH_FORK_H
 
@@ -18,6 +19,7 @@
 #define FORK_PRINT REAL(20)    /* [-] of an element's depth: the deepest u_max that it is given */
 #define FORK_DEEPEST REAL(0.5) /* [m] by which a robot may be moved, either way */
 #define FORK_SAME REAL(1e-3)   /* [-] of the load: grounds are the same */
+#define FORK_LEAST REAL(1)     /* [N] of load */
 
 /* That of an environment. */
 MILD_HD char *env_block(const EnvsFork *fork, long robot) {
@@ -104,13 +106,10 @@ MILD_HD EnvPrints env_prints(const EnvsFork *fork, long robot) {
     return prints;
 }
 
-/* What element `at` of foot f stands on. */
+/* What foot f stands on: level ground of one material. */
 MILD_HD const ContactMaterial *env_stands_on(const EnvsArrays *all, const EnvsFork *fork,
-                                             long robot, const EnvPrints *prints, int f, int at) {
-    const int labels = all->task->labels;
-    const int own =
-        fork->shape.map ? (int)prints->numbers[(CONTACT_MEMORY + 3) * prints->next + at] : 0;
-    const int material = all->material[robot * labels + env_within(own, labels)];
+                                             long robot, int f) {
+    const int material = all->material[robot * all->task->labels];
     return (const ContactMaterial *)(const void *)fork->ground.materials +
            env_within(material, fork->shape.materials) * fork->shape.feet + f;
 }
@@ -126,7 +125,7 @@ MILD_HD Real env_element_bears(const EnvsArrays *all, const EnvsFork *fork, long
     const EnvPrints prints = env_prints(fork, robot);
     const int stride = fork->shape.stride, at = f * stride + e;
     const Real *place = fork->ground.elements + f * CONTACT_PLACES * stride + e;
-    const ContactMaterial *on = env_stands_on(all, fork, robot, &prints, f, at);
+    const ContactMaterial *on = env_stands_on(all, fork, robot, f);
     const Law law = on->projects > 0 ? law_of_heap(on->law, place[CONTACT_BEGIN * stride],
                                                    place[CONTACT_WIDTH * stride])
                                      : on->law;
@@ -166,7 +165,7 @@ MILD_HD Real env_bears_deeper(const EnvsArrays *all, const EnvsFork *fork, long 
             const int at = f * fork->shape.stride + e;
             const Real depth = prints.numbers[prints.next + at] + deeper;
             if (prints.numbers[at] > 0) {
-                const Real recovery = env_stands_on(all, fork, robot, &prints, f, at)->recovery;
+                const Real recovery = env_stands_on(all, fork, robot, f)->recovery;
                 const Real share = env_rest(fork, robot)[1 + at];
                 sum += env_element_bears(all, fork, robot, f, e, depth,
                                          env_deepest(recovery, share, depth));
@@ -204,7 +203,7 @@ MILD_HD void env_shift_prints(const EnvsArrays *all, const EnvsFork *fork, long 
             const int at = f * fork->shape.stride + e;
             Real *number = prints.numbers + at;
             const Real depth = number[prints.next] + deeper;
-            const Real recovery = env_stands_on(all, fork, robot, &prints, f, at)->recovery;
+            const Real recovery = env_stands_on(all, fork, robot, f)->recovery;
             const int loaded = number[0] > 0;
             if (loaded && depth > 0) {
                 number[0] = env_deepest(recovery, env_rest(fork, robot)[1 + at], depth);
@@ -235,8 +234,8 @@ MILD_HD Real env_deeper(const EnvsArrays *all, const EnvsFork *fork, long robot)
 
 /* ---- back ---- */
 
-/* Sets a robot down on ground that was not of the same kind, or is not, and is level and of one
- * material: its lowest sole below the surface becomes as deep as one that stands; one in the air is
+/* Sets a robot down whose ground has no prints, or had none: rigid, or at the start of an episode.
+ * Its lowest sole below the surface becomes as deep as one that stands; one in the air is
  * lowered by that depth. The ground forgets the feet. By a tile. */
 MILD_HD void env_set_down(const EnvsArrays *all, const EnvsFork *fork, long robot) {
     TaskEnv *env = env_at(all, robot);
@@ -302,15 +301,15 @@ MILD_HD void env_take_back(const EnvsArrays *all, const EnvsFork *fork, long rob
     if (!fork->own_ground) {
         return;
     }
-    if (was_rigid || kept->rigid) {
+    if (was_rigid || kept->rigid || all->reset[robot]) {
         env_set_down(all, fork, robot);
         return;
     }
     const Real load = env_rest(fork, robot)[0];
-    if (REAL_ABS(env_bears(all, fork, robot) - load) <= FORK_SAME * load) {
+    if (!(REAL_ABS(env_bears(all, fork, robot) - load) > FORK_SAME * load)) {
         return;
     }
-    const Real deeper = env_deeper(all, fork, robot);
+    const Real deeper = load > FORK_LEAST ? env_deeper(all, fork, robot) : 0;
     env_shift_prints(all, fork, robot, deeper);
     if (tile_lane() == 0) {
         env->robot.qpos[2] -= deeper;

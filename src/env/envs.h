@@ -92,10 +92,11 @@ MildStatus envs_save(Envs *envs, int first, int count, void *blocks, MildStream 
  * groups of them, and so on. Each environment keeps its seed, its number and its count of steps, so
  * that without noise and pushes all of a group do the same under the same actions.
  *
- * own_ground: bool, each also keeps its ground, so that a block fits grounds of any kind. Where
+ * own_ground: bool, each also keeps its ground, rigid or soft, level and of one material. Where
  * both are soft, the robot and its prints are moved up or down together until the feet bear at rest
- * what they bore; on the same ground nothing moves. Where one is rigid the ground forgets the feet,
- * and the lowest sole becomes as deep as one that stands there. */
+ * what they bore; on the same ground nothing moves. Where one is rigid, and at the start of an
+ * episode, the ground forgets the feet, and the lowest sole becomes as deep as one that stands
+ * there. */
 MildStatus envs_fork(Envs *envs, const void *blocks, int count, size_t bytes, int own_ground,
                      MildStream stream, MildError *error);
 

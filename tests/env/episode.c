@@ -39,7 +39,8 @@ void episode_throw(const Envs *envs, int i, double speed) {
     env_at(envs_batch_arrays(envs), i)->robot.qvel[0] = (float)speed;
 }
 
-void episode_stop(const Envs *envs, int i) {
+void episode_lift(const Envs *envs, int i, double speed) {
     TaskEnv *env = env_at(envs_batch_arrays(envs), i);
     memset(env->robot.qvel, 0, sizeof env->robot.qvel);
+    env->robot.qvel[2] = (float)speed;
 }

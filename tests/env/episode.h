@@ -26,7 +26,7 @@ typedef struct {
 Episode episode_of(const Envs *envs, int i);
 /* Gives its base a speed [m/s] forward. */
 void episode_throw(const Envs *envs, int i, double speed);
-/* Stops it. */
-void episode_stop(const Envs *envs, int i);
+/* Gives its base a speed [m/s] up, and no other motion to anything. */
+void episode_lift(const Envs *envs, int i, double speed);
 
 #endif

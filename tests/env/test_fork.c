@@ -250,34 +250,77 @@ TEST(forks_go_on_where_their_ground_is_the_same) {
     close_both();
 }
 
-/* On another soft ground they stand `least` to `most` [m] deeper, with their prints, and bear what
- * they bore, but for the drag of speed and the added mass. */
-static void check_load(const char *soil, double least, double most) {
-    TaskSoils soils[2];
-    const TaskDef sand = soil_def("sand_dense", &soils[0]), other = soil_def(soil, &soils[1]);
-    double deeper[MANY];
-    open_both(SA01, &sand, &other);
+/* [m] By how much lower environment e is than what was saved. */
+static double deeper_by(int e) {
+    return episode_of(both.a.envs, 1 + e / (MANY / SAVED)).qpos[2] -
+           episode_of(both.b.envs, e).qpos[2];
+}
+
+/* From standing in dense sand onto another ground. lift: [m/s] see episode_lift, before `steps`. */
+static void open_standing(const TaskDef *sand, const TaskDef *other, double lift, int steps) {
+    open_both(SA01, sand, other);
     memset(both.a.action, 0, sizeof both.a.action);
     memset(both.b.action, 0, sizeof both.b.action);
     for (int t = 0; t < 20; t++) {
         step_side(&both.a);
     }
     for (int e = 0; e < FEW; e++) {
-        episode_stop(both.a.envs, e);
+        episode_lift(both.a.envs, e, lift);
+    }
+    for (int t = 0; t < steps; t++) {
+        step_side(&both.a);
     }
     free(fork_both(1));
+}
+
+/* On another soft ground they stand `least` to `most` [m] deeper, with their prints, and bear what
+ * they bore, but for the drag of speed and the added mass. */
+static void check_load(const char *soil, double least, double most) {
+    TaskSoils soils[2];
+    const TaskDef sand = soil_def("sand_dense", &soils[0]), other = soil_def(soil, &soils[1]);
+    open_standing(&sand, &other, 0, 0);
     for (int e = 0; e < MANY; e++) {
-        deeper[e] = episode_of(both.a.envs, 1 + e / (MANY / SAVED)).qpos[2] -
-                    episode_of(both.b.envs, e).qpos[2];
+        printf("%s: %.1f mm deeper\n", soil, 1e3 * deeper_by(e));
+        assert_true(deeper_by(e) > least && deeper_by(e) < most);
     }
     step_side(&both.a);
     step_side(&both.b);
     for (int e = 0; e < MANY; e++) {
         const double bore = episode_of(both.a.envs, 1 + e / (MANY / SAVED)).load;
-        const double bears = episode_of(both.b.envs, e).load;
-        printf("%s: %.1f mm deeper, %.0f for %.0f N\n", soil, 1e3 * deeper[e], bears, bore);
-        assert_true(deeper[e] > least && deeper[e] < most);
-        expect_near("load", bears, bore, 0.12 * bore);
+        expect_near("load", episode_of(both.b.envs, e).load, bore, 0.12 * bore);
+    }
+    close_both();
+}
+
+/* Feet in the air in their prints stay there, without load. */
+TEST(forks_in_the_air_are_not_moved) {
+    TaskSoils soils[2];
+    const TaskDef sand = soil_def("sand_dense", &soils[0]), foam = soil_def("foam25", &soils[1]);
+    open_standing(&sand, &foam, 1, 1);
+    for (int e = 0; e < MANY; e++) {
+        const int from = 1 + e / (MANY / SAVED);
+        expect_near("load", episode_of(both.a.envs, from).load, 0, 1);
+        expect_near("deeper", deeper_by(e), 0, 1e-6);
+    }
+    step_side(&both.b);
+    for (int e = 0; e < MANY; e++) {
+        expect_near("load", episode_of(both.b.envs, e).load, 0, 20);
+    }
+    close_both();
+}
+
+/* An episode that has just begun has no prints, and stands in the other ground as deep as one
+ * begins there. */
+TEST(forks_begin_on_their_ground) {
+    TaskSoils soils[2];
+    const TaskDef sand = soil_def("sand_dense", &soils[0]), foam = soil_def("foam25", &soils[1]);
+    MildError error = {0};
+    open_both(SA01, &sand, &foam);
+    const EnvsView view = view_on(&both.a);
+    assert_int_equal(envs_reset(both.a.envs, &view, NULL, &error), MILD_OK);
+    free(fork_both(1));
+    for (int e = 0; e < MANY; e++) {
+        assert_true(deeper_by(e) > 0.005 && deeper_by(e) < 0.03);
     }
     close_both();
 }

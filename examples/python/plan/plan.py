@@ -202,7 +202,7 @@ class Planner:
 
 def walk(given, numbers, log=print):
     """Trials side by side; returns what became of each, and the time that a plan takes."""
-    robot, speed, device, believes = given.robot, given.speed, given.device, given.believes or given.ground
+    robot, speed, device, believes = given.robot, given.speed * (not given.jump), given.device, given.believes or given.ground
     arrays = Arrays(device)
     keys = {**KEYS, **numbers["keys"], "task.vx": (speed, speed), "task.gait_period": numbers["gait"]["period"]}
     keys.update({**numbers["jump"]["keys"], "task.jump": (given.jump, given.jump), "task.jump_start": given.jump} if given.jump else {})
@@ -246,7 +246,7 @@ def walk(given, numbers, log=print):
     walked = alive & (abs(moved[0] / given.seconds - speed) <= 0.2 * max(speed, 0.1))
     trials = [{"upright": round(float(u), 2), "forward": float(m[0]), "side": float(m[1]), "turned": float(m[2]), "highest": float(h),
                "walked": bool(w)} for u, m, w, h in zip(upright, moved.T, walked, np.max(path, axis=0)[:, 2])]
-    return {"robot": robot, "ground": given.ground, "believes": given.believes, "speed": speed, "samples": given.samples,
+    return {"robot": robot, "ground": given.ground, "believes": given.believes, "speed": speed, "jump": given.jump, "samples": given.samples,
             "walked": int(walked.sum()), "upright": int(alive.sum()), "trials": trials,
             "plan_ms": float(np.median(times[1:] or times))}, np.array(path)
 
@@ -273,7 +273,7 @@ def main():
     for name, default, words in (
             ("robot", "go1", "sa01, g1 or go1"), ("ground", "rigid", "rigid, or a preset (mild info grounds)"),
             ("believes", "", "a ground that the planner believes in; empty: the true one"), ("speed", 0.5, "[m/s]"), ("seconds", 10.0, "of a walk"),
-            ("jump", 0.0, "[m] rise of jumps, one after the other; 0: it walks"),
+            ("jump", 0.0, "[m] jumps in place, so high above its nominal height; 0: it walks"),
             ("samples", 2048, "plans that are tried at once"), ("trials", 1, "side by side, with starts of their own"), ("seed", 1, "of the starts"),
             ("device", "cpu", "cpu, cuda or cuda:N"), ("threads", 0, "of the CPU; 0: one per core"),
             ("policy", "", "a policy's file: plans are offsets from its actions, in the gait's place"),
@@ -284,8 +284,8 @@ def main():
     try:
         numbers = json.loads(pathlib.Path(given.numbers).read_text())
         names = [name for name in numbers if not given.jump or "jump" in numbers[name]]
-        if given.robot not in names:
-            parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(names)}")
+        if given.robot not in names or given.jump and given.policy:
+            parser.error(f"--robot {given.robot}: {given.numbers} has {', '.join(names)}" + ", which jump without --policy" * bool(given.jump))
         result, path = walk(given, numbers[given.robot])
         print(json.dumps(result), flush=True)
         if given.path:

@@ -233,8 +233,8 @@ const MildField task_fields[] = {
       "[-] eval, play and drive correct the commanded speed by the policy's own estimate of it, "
       "and the turn by the gyro: least weight of a gait cycle; 0: not at all"),
     T(speed_hold_most, D, 1, 0, 4,
-      "[m/s] the speed hold raises no forward command above this, e.g. the highest in training, "
-      "behind which a policy may run slower or stop; 0: no bound"),
+      "[m/s] the speed hold raises no forward command above this, e.g. the highest in training: "
+      "above it a policy may run slower or stop; 0: no bound"),
     T(swing_apex, D, 1, 0.01, 0.4,
       "[m] height of the swing foot above the undisturbed surface that the clock asks for"),
     T(double_support, D, 1, 0, 1,

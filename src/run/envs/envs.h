@@ -92,10 +92,11 @@ MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, MildStream strea
  * caller's, on the device, at a multiple of 16, each of mild_envs_block_bytes of the environments
  * that wrote it; on a GPU these functions only put work into the stream.
  *
- * own_ground: bool, each environment keeps its ground: for a ground that another one is believed
- * to be. Where both are soft, the robot and its prints are moved up or down together until the feet
- * bear at rest what they bore; where one is rigid, prints go and the robot is set down as deep as
- * it stands. Then train.seed and the section randomize may differ, too. */
+ * own_ground: bool, each environment keeps its ground, level and of one material: what another one
+ * is believed to be. Where both are soft, the robot and its prints are moved up or down together
+ * until the feet bear at rest what they bore; where one is rigid, and at the start of an episode,
+ * prints go and the robot is set down as deep as it stands. Then train.seed and the section
+ * randomize may differ, too. */
 size_t mild_envs_block_bytes(const MildEnvs *envs, int own_ground);
 MildStatus mild_envs_save(MildEnvs *envs, int first, int count, void *blocks, MildStream stream,
                           MildError *error);

@@ -17,6 +17,7 @@
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
 #define PUSH_INTERVAL 4.0 /* [s] */
+#define LED_MOST 10.0     /* [m/s] */
 #define RANDOM_USE_PUSH 0x45505553u
 #define TWO_PI 6.283185307179586
 
@@ -342,8 +343,10 @@ static MildStatus hear_speed(Trials *t, double time, MildError *error) {
         if (fflush(stdout) != 0 || !fgets(line, sizeof line, stdin)) {
             return mild_fail(error, MILD_ERROR_IO, "--led: nobody says how fast to go");
         }
-        line[strcspn(line, "\n")] = 0;
-        if (!text_double(line, &t->heard[i])) {
+        const size_t end = strcspn(line, "\n");
+        const int whole = line[end] == '\n';
+        line[end] = 0;
+        if (!whole || !text_double(line, &t->heard[i]) || fabs(t->heard[i]) > LED_MOST) {
             return mild_fail(error, MILD_ERROR_IO, "--led: '%s' is no speed", line);
         }
     }
