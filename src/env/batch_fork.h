@@ -1,10 +1,11 @@
 /* Saving an environment of the batch engine and putting it into others: envs_save, envs_fork.
  *
- * On another soft ground, own_ground, a robot takes its prints along. An element at the depth u that
- * has been at a bears the share s of what it would bear at a. It keeps s, so that on ground that
- * gives back r of a
+ * On another soft ground, own_ground, a robot takes its prints along. An element at the depth u
+ * that has been at a bears the share s of what it would bear at a. It keeps s, so that on ground
+ * that gives back r of a
  *
  *     a = u + (1 - s) max(r a, ELEMENT_ELASTIC),   a <= FORK_PRINT u
+ *
  * and the robot is moved up or down until the feet bear at rest what they bore in the block. Where
  * they bear that already nothing moves: the same ground is as if it were copied. A robot without
  * load is not moved; its elements bear nothing. */
