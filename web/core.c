@@ -435,7 +435,6 @@ static const MildMaterial *material_at(double x, double y) {
 static void stand_up(double x, double y, double yaw) {
     TaskEnv *env = web_env();
     belief_reset(&web.belief);
-    web.hold = (SpeedHold){0};
     web.view.footsteps = web.view.alarms = 0;
     const double load = web.task.robot.total_mass * web.file->gravity / web.feet;
     memset(env->command, 0, sizeof env->command);

@@ -250,6 +250,7 @@ static int pack(Robot *robot, Policy *policy, const TaskDef *task, const char *p
     if (shape.scan > 0) {
         return stop("the policy sees the ground (task.scan), which the page does not show it");
     }
+    /* as speed_hold_def */
     file.hold = (SpeedHoldDef){.gain = policy_def(policy)->estimates ? task->speed_hold : 0,
                                .scale = task->velocity_scale,
                                .most = task->speed_hold_most,

@@ -116,8 +116,8 @@ void batch_list_rows(const Batch *b, EnvsArrays *all, BatchArrays *ground, Row r
         {&all->shells.waiting, 4 * shells * sizeof *all->shells.waiting, ROW_WORK},
         {&all->order, sizeof *all->order, ROW_WORK},
         {&all->shells.memory, shells * b->bodies.numbers * sizeof(float), ROW_GROUND},
-        {&ground->memory, batch_memory_numbers(&b->ground->shape) * sizeof(float), ROW_PRINTS},
-        {&ground->worn, batch_worn_numbers(&b->ground->shape) * sizeof(float), ROW_PRINTS}};
+        {&ground->worn, batch_worn_numbers(&b->ground->shape) * sizeof(float), ROW_PRINTS},
+        {&ground->memory, batch_memory_numbers(&b->ground->shape) * sizeof(float), ROW_PRINTS}};
     memcpy(rows, list, sizeof list);
 }
 

@@ -24,7 +24,8 @@ static size_t whole(size_t bytes) {
 }
 
 /* The rows of a block in the order of RowKind, so that a fork with own_ground reads its beginning.
- * Returns its bytes. */
+ * The memory of the feet is last there: on a map it has more numbers, behind the others. Returns
+ * its bytes. */
 static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
     EnvsArrays all = b->arrays;
     BatchArrays ground = b->ground->arrays;
@@ -34,6 +35,10 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
     *fork = (EnvsFork){
         .own_ground = own_ground, .group = 1, .shape = b->ground->shape, .ground = ground};
     for (int kind = ROW_STATE; kind <= (own_ground ? ROW_PRINTS : ROW_GROUND); kind++) {
+        if (kind == ROW_PRINTS) {
+            fork->rest = place;
+            place += whole((1 + batch_worn_numbers(&fork->shape)) * sizeof(float));
+        }
         for (int i = 0; i < ROWS; i++) {
             if ((int)rows[i].kind != kind || rows[i].bytes == 0) {
                 continue;
@@ -43,10 +48,6 @@ static size_t fork_rows(const Batch *b, int own_ground, EnvsFork *fork) {
             fork->row[fork->count].place = place;
             fork->count++;
             place += whole(rows[i].bytes);
-        }
-        if (kind == ROW_PRINTS) {
-            fork->rest = place;
-            place += whole((1 + batch_worn_numbers(&fork->shape)) * sizeof(float));
         }
     }
     return place;

@@ -107,10 +107,14 @@ MILD_HD EnvPrints env_prints(const EnvsFork *fork, long robot) {
     return prints;
 }
 
-/* What foot f stands on: level ground of one material. */
+/* What element e of foot f stands on. */
 MILD_HD const ContactMaterial *env_stands_on(const EnvsArrays *all, const EnvsFork *fork,
-                                             long robot, int f) {
-    const int material = all->material[robot * all->task->labels];
+                                             long robot, int f, int e) {
+    const EnvPrints prints = env_prints(fork, robot);
+    const Real *label = prints.numbers + (CONTACT_MEMORY + 3) * prints.next;
+    const int own = fork->shape.map ? (int)label[f * fork->shape.stride + e] : 0;
+    const int labels = all->task->labels;
+    const int material = all->material[robot * labels + env_within(own, labels)];
     return (const ContactMaterial *)(const void *)fork->ground.materials +
            env_within(material, fork->shape.materials) * fork->shape.feet + f;
 }
@@ -126,7 +130,7 @@ MILD_HD Real env_element_bears(const EnvsArrays *all, const EnvsFork *fork, long
     const EnvPrints prints = env_prints(fork, robot);
     const int stride = fork->shape.stride, at = f * stride + e;
     const Real *place = fork->ground.elements + f * CONTACT_PLACES * stride + e;
-    const ContactMaterial *on = env_stands_on(all, fork, robot, f);
+    const ContactMaterial *on = env_stands_on(all, fork, robot, f, e);
     const Law law = on->projects > 0 ? law_of_heap(on->law, place[CONTACT_BEGIN * stride],
                                                    place[CONTACT_WIDTH * stride])
                                      : on->law;
@@ -166,7 +170,7 @@ MILD_HD Real env_bears_deeper(const EnvsArrays *all, const EnvsFork *fork, long 
             const int at = f * fork->shape.stride + e;
             const Real depth = prints.numbers[prints.next + at] + deeper;
             if (prints.numbers[at] > 0) {
-                const Real recovery = env_stands_on(all, fork, robot, f)->recovery;
+                const Real recovery = env_stands_on(all, fork, robot, f, e)->recovery;
                 const Real share = env_rest(fork, robot)[1 + at];
                 sum += env_element_bears(all, fork, robot, f, e, depth,
                                          env_deepest(recovery, share, depth));
@@ -179,8 +183,8 @@ MILD_HD Real env_bears_deeper(const EnvsArrays *all, const EnvsFork *fork, long 
 /* Before an environment is saved, by a tile. */
 MILD_HD void env_weigh(const EnvsArrays *all, const EnvsFork *fork, long robot) {
     const EnvPrints prints = env_prints(fork, robot);
-    const Real load = env_bears(all, fork, robot);
     Real *rest = env_rest(fork, robot);
+    Real load = 0;
     for (int f = 0; f < fork->shape.feet; f++) {
         for (int e = tile_lane(); e < fork->shape.elements[f]; e += TILE) {
             const int at = f * fork->shape.stride + e;
@@ -188,8 +192,10 @@ MILD_HD void env_weigh(const EnvsArrays *all, const EnvsFork *fork, long robot) 
             const Real bore = a > 0 ? env_element_bears(all, fork, robot, f, e, u, a) : 0;
             const Real whole = a > 0 ? env_element_bears(all, fork, robot, f, e, a, a) : 0;
             rest[1 + at] = real_over(bore, whole + ELEMENT_TINY);
+            load += bore;
         }
     }
+    load = tile_sum(load);
     if (tile_lane() == 0) {
         rest[0] = load;
     }
@@ -204,7 +210,7 @@ MILD_HD void env_shift_prints(const EnvsArrays *all, const EnvsFork *fork, long 
             const int at = f * fork->shape.stride + e;
             Real *number = prints.numbers + at;
             const Real depth = number[prints.next] + deeper;
-            const Real recovery = env_stands_on(all, fork, robot, f)->recovery;
+            const Real recovery = env_stands_on(all, fork, robot, f, e)->recovery;
             const int loaded = number[0] > 0;
             if (loaded && depth > 0) {
                 number[0] = env_deepest(recovery, env_rest(fork, robot)[1 + at], depth);

@@ -140,6 +140,8 @@ bad "--feet" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots
 bad "--program" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --program true
 bad "--led" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --led
 expect 2 '--led: nobody' "$mild" eval --ground grass --trials 1 --seconds 0.1 --led
+bad "--led" "$mild" eval --ground grass --trials 1 --seconds 0.1 --led --json -
+expect 2 "--led: '11'" bash -c "echo 11 | '$mild' eval --ground grass --trials 1 --seconds 0.1 --led"
 expect 2 "--led: 'fast'" bash -c "echo fast | '$mild' eval --ground grass --trials 1 --seconds 0.1 --led"
 for speed in 0.6 0.3; do
     "$mild" eval --ground grass --trials 2 --seconds 1 --led --json led.json < <(yes $speed 2>/dev/null) >led.txt 2>/dev/null || fail "--led"

@@ -170,6 +170,18 @@ TEST(speeding_up_teaches_nothing) {
     }
 }
 
+/* Nor does a command that never rests, but not for long after it. */
+TEST(restless_commands_are_forgotten) {
+    Walker w = walker_at(0.5, 0.9);
+    for (int k = 0; k < 6000; k++) {
+        w.wanted[0] = 0.5 + 0.02 * (k % 2);
+        walk(&w, 1);
+        assert_true(w.hold.ratio[0] == 0);
+    }
+    walk(&w, 600 + 20 * CYCLE);
+    expect_near("speed", 0.9 * w.command[0], w.wanted[0], 0.01);
+}
+
 /* A policy may stop where it never was in training: it is commanded there by who wants it alone. */
 TEST(a_fast_command_is_bounded) {
     Walker w = walker_at(3.5, 0.9);

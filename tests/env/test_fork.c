@@ -273,14 +273,11 @@ static void open_standing(const TaskDef *sand, const TaskDef *other, double lift
     free(fork_both(1));
 }
 
-/* On another soft ground they stand `least` to `most` [m] deeper, with their prints, and bear what
- * they bore, but for the drag of speed and the added mass. */
-static void check_load(const char *soil, double least, double most) {
-    TaskSoils soils[2];
-    const TaskDef sand = soil_def("sand_dense", &soils[0]), other = soil_def(soil, &soils[1]);
-    open_standing(&sand, &other, 0, 0);
+/* They stand `least` to `most` [m] deeper, with their prints, and bear what they bore, but for the
+ * drag of speed and the added mass. */
+static void check_stands(double least, double most) {
     for (int e = 0; e < MANY; e++) {
-        printf("%s: %.1f mm deeper\n", soil, 1e3 * deeper_by(e));
+        printf("%.1f mm deeper\n", 1e3 * deeper_by(e));
         assert_true(deeper_by(e) > least && deeper_by(e) < most);
     }
     step_side(&both.a);
@@ -289,7 +286,36 @@ static void check_load(const char *soil, double least, double most) {
         const double bore = episode_of(both.a.envs, 1 + e / (MANY / SAVED)).load;
         expect_near("load", episode_of(both.b.envs, e).load, bore, 0.12 * bore);
     }
+}
+
+static void check_load(const char *soil, double least, double most) {
+    TaskSoils soils[2];
+    const TaskDef sand = soil_def("sand_dense", &soils[0]), other = soil_def(soil, &soils[1]);
+    open_standing(&sand, &other, 0, 0);
+    check_stands(least, most);
     close_both();
+}
+
+/* From a map onto level ground of the same sand: its memory has more numbers. */
+TEST(forks_come_from_a_map) {
+    TaskSoils soils[2];
+    TaskDef sand = soil_def("sand_dense", &soils[0]);
+    const TaskDef level = soil_def("sand_dense", &soils[1]);
+    MildError error = {0};
+    MildMapDef waves = mild_map_def_default();
+    waves.kind = MILD_MAP_WAVES;
+    waves.amplitude = 1e-4; /* [m] */
+    MildMap *map = mild_map_create(&waves, NULL);
+    sand.map = map;
+    open_standing(&sand, &level, 0, 0);
+    check_stands(-1e-3, 1e-3);
+    char *blocks = fork_both(1); /* of a */
+    assert_refused(
+        envs_fork(both.a.envs, blocks, SAVED, envs_block_bytes(both.a.envs, 0), 1, NULL, &error),
+        MILD_ERROR_ARGUMENT, &error, "own_ground level");
+    free(blocks);
+    close_both();
+    mild_map_destroy(map);
 }
 
 /* Feet in the air in their prints stay there, without load. */

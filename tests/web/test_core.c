@@ -310,7 +310,7 @@ static void soles_of(int which) {
     assert_true(fabs((load + shells) / weight - 1) < 0.1 && load > 0.7 * weight);
 }
 
-/* The G1 that runs: 3 m/s over grass, with both feet off the ground. */
+/* The G1 that runs: 3 m/s over grass, with both feet off the ground; then it turns in place. */
 TEST(test_run) {
     const WebView *view = web_view();
     int flies = 0;
@@ -324,10 +324,16 @@ TEST(test_run) {
     }
     const double speed =
         hypot((double)view->link[0][3] - from, (double)view->link[0][7] - left) / 3;
-    printf("  it runs at %.2f m/s and flies %d %% of the time\n", speed,
-           flies * 100 / (3 * SECOND));
+    double turned = 0;
+    for (int t = 0; t < 24 * SECOND; t++) {
+        assert_false(web_step(0, 0, 0.8f, 0));
+        turned += t < 4 * SECOND ? 0 : 0.01 / 20 * (double)view->velocity[2];
+    }
+    printf("  it runs at %.2f m/s, flies %d %% of the time, and turns at %.2f rad/s\n", speed,
+           flies * 100 / (3 * SECOND), turned);
     choose(ON_SA01);
     assert_true(speed > 2.7 && flies > 3 * SECOND / 10);
+    assert_true(fabs(turned - 0.8) < 0.04); /* by the speed hold; 0.72 without */
 }
 
 /* The G1 that jumps: the highest that its base gets [m] while no foot carries, in so many steps. */
